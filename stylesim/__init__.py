@@ -1,0 +1,1 @@
+"""Traffic with drivers of every style: generate, label, merge, forecast, stress-test."""

@@ -1,0 +1,23 @@
+"""Construction checks shared by the frozen array types."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+
+def frozen(array: Any, dtype: npt.DTypeLike, shape: tuple[int | None, ...], name: str) -> npt.NDArray[Any]:
+    """`array` as a read-only array of that dtype; ValueError if its shape is not `shape` (None: any length).
+
+    The input is copied only where its dtype differs or somebody else could still write to it.
+    """
+    result = np.asarray(array, dtype=dtype)
+    if result.ndim != len(shape) or any(want not in (None, have) for want, have in zip(shape, result.shape, strict=True)):
+        wanted = tuple("any" if n is None else n for n in shape)
+        raise ValueError(f"{name} has shape {result.shape}, wanted {wanted}")
+    if result.flags.writeable:
+        result = result.copy() if result is array or result.base is not None else result
+        result.flags.writeable = False
+    return result

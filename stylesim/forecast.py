@@ -1,0 +1,61 @@
+"""`Forecast`, what a forecaster is asked (`ForecastTask`) and what it must be able to do (`Forecaster`)."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Protocol, runtime_checkable
+
+import numpy as np
+from jaxtyping import Float32, Int32
+
+from stylesim.arrays import frozen
+from stylesim.scene import Scene
+
+
+@dataclass(frozen=True, eq=False)
+class ForecastTask:
+    """One question: where will these agents be?
+
+    `scene` holds history only (made by `Scene.history`): its last frame is t0, it has no commanded style and no
+    outcome flags. `agent_index` are the agents to forecast; the answer has `future_steps` steps of `scene.tracks.dt_s`.
+    """
+
+    scene: Scene
+    agent_index: Int32[np.ndarray, " driver"]
+    future_steps: int
+    t0_frame: int  # frame number of t0 in the scene that this was cut from
+
+    def __post_init__(self) -> None:
+        """Freeze the index."""
+        object.__setattr__(self, "agent_index", frozen(self.agent_index, np.int32, (None,), "agent_index"))
+
+
+@dataclass(frozen=True, eq=False)
+class Forecast:
+    """Modes of the future in the scene's frame, and their probabilities (each driver's sum to 1)."""
+
+    mode_m: Float32[np.ndarray, "driver mode time 2"]
+    probability: Float32[np.ndarray, "driver mode"]
+
+    def __post_init__(self) -> None:
+        """Check shapes, finiteness and that probabilities sum to 1 within 1e-3."""
+        modes = frozen(self.mode_m, np.float32, (None, None, None, 2), "mode_m")
+        chance = frozen(self.probability, np.float32, modes.shape[:2], "probability")
+        if not (np.isfinite(modes).all() and np.isfinite(chance).all()):
+            raise ValueError("a forecast must be finite")
+        if len(chance) and (chance.min() < 0 or np.abs(chance.sum(axis=1) - 1).max() > 1e-3):
+            raise ValueError("mode probabilities must be >= 0 and sum to 1 for each driver")
+        object.__setattr__(self, "mode_m", modes)
+        object.__setattr__(self, "probability", chance)
+
+
+@runtime_checkable
+class Forecaster(Protocol):
+    """Anything that forecasts. One `Forecast` per task, drivers in the order of `task.agent_index`."""
+
+    name: str
+
+    def predict(self, tasks: Sequence[ForecastTask]) -> list[Forecast]:
+        """Forecast every task."""
+        ...
