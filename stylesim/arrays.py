@@ -11,13 +11,15 @@ import numpy.typing as npt
 def frozen(array: Any, dtype: npt.DTypeLike, shape: tuple[int | None, ...], name: str) -> npt.NDArray[Any]:
     """`array` as a read-only array of that dtype; ValueError if its shape is not `shape` (None: any length).
 
-    The input is copied only where its dtype differs or somebody else could still write to it.
+    Any real dtype is taken and stored as `dtype`; the input is copied unless it is read-only already.
     """
     result = np.asarray(array, dtype=dtype)
-    if result.ndim != len(shape) or any(want not in (None, have) for want, have in zip(shape, result.shape, strict=True)):
+    if result.ndim != len(shape) or any(
+        want not in (None, have) for want, have in zip(shape, result.shape, strict=True)
+    ):
         wanted = tuple("any" if n is None else n for n in shape)
         raise ValueError(f"{name} has shape {result.shape}, wanted {wanted}")
     if result.flags.writeable:
-        result = result.copy() if result is array or result.base is not None else result
+        result = result.copy() if np.may_share_memory(result, array) else result
         result.flags.writeable = False
     return result

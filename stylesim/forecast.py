@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from typing import Protocol, runtime_checkable
 
 import numpy as np
-from jaxtyping import Float32, Int32
+from jaxtyping import Float, Int
 
 from stylesim.arrays import frozen
 from stylesim.scene import Scene
@@ -22,7 +22,7 @@ class ForecastTask:
     """
 
     scene: Scene
-    agent_index: Int32[np.ndarray, " driver"]
+    agent_index: Int[np.ndarray, " driver"]
     future_steps: int
     t0_frame: int  # frame number of t0 in the scene that this was cut from
 
@@ -35,8 +35,8 @@ class ForecastTask:
 class Forecast:
     """Modes of the future in the scene's frame, and their probabilities (each driver's sum to 1)."""
 
-    mode_m: Float32[np.ndarray, "driver mode time 2"]
-    probability: Float32[np.ndarray, "driver mode"]
+    mode_m: Float[np.ndarray, "driver mode time 2"]
+    probability: Float[np.ndarray, "driver mode"]
 
     def __post_init__(self) -> None:
         """Check shapes, finiteness and that probabilities sum to 1 within 1e-3."""

@@ -26,7 +26,9 @@ def arc_length(line_m: Float[np.ndarray, "point 2"]) -> Float[np.ndarray, " poin
 
 def project(
     points_m: Float[np.ndarray, "query 2"], line_m: Float[np.ndarray, "point 2"]
-) -> tuple[Float[np.ndarray, " query"], Float[np.ndarray, " query"], Float[np.ndarray, " query"], Int[np.ndarray, " query"]]:
+) -> tuple[
+    Float[np.ndarray, " query"], Float[np.ndarray, " query"], Float[np.ndarray, " query"], Int[np.ndarray, " query"]
+]:
     """The nearest place on a polyline for each point.
 
     Returns (along, offset, distance, segment): arc length of the foot point, signed lateral offset (left of the

@@ -8,7 +8,7 @@ from enum import IntFlag
 from typing import Any
 
 import numpy as np
-from jaxtyping import Bool, Float32, Int8, Int32
+from jaxtyping import Bool, Float, Int
 
 from stylesim.arrays import frozen
 
@@ -41,17 +41,17 @@ class StyleLabels:
     feature_names: tuple[str, ...]
     scene_id: tuple[str, ...]
     agent_id: tuple[str, ...]
-    start_frame: Int32[np.ndarray, " row"]
-    stop_frame: Int32[np.ndarray, " row"]
-    score: Float32[np.ndarray, "row style"]
-    style: Int8[np.ndarray, " row"]  # index into classes, or UNDETERMINED
-    margin: Float32[np.ndarray, " row"]  # best score minus second best
-    aggressiveness: Float32[np.ndarray, " row"]  # the measured `a`; NaN where undetermined
-    feature: Float32[np.ndarray, "row feature"]  # SI units; NaN where missing
+    start_frame: Int[np.ndarray, " row"]
+    stop_frame: Int[np.ndarray, " row"]
+    score: Float[np.ndarray, "row style"]
+    style: Int[np.ndarray, " row"]  # index into classes, or UNDETERMINED
+    margin: Float[np.ndarray, " row"]  # best score minus second best
+    aggressiveness: Float[np.ndarray, " row"]  # the measured `a`; NaN where undetermined
+    feature: Float[np.ndarray, "row feature"]  # SI units; NaN where missing
     missing: Bool[np.ndarray, "row feature"]
-    flags: Int32[np.ndarray, " row"]
-    score_transposed: Float32[np.ndarray, "row other"] | None = None  # TDBM's other reading
-    style_transposed: Int8[np.ndarray, " row"] | None = None
+    flags: Int[np.ndarray, " row"]
+    score_transposed: Float[np.ndarray, "row other"] | None = None  # TDBM's other reading
+    style_transposed: Int[np.ndarray, " row"] | None = None
     provenance: Mapping[str, Any] = field(default_factory=dict)  # JSON-able: scaler hash, options
 
     def __post_init__(self) -> None:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
-from jaxtyping import Float32
+from jaxtyping import Float
 
 from stylesim.arrays import frozen
 
@@ -15,13 +15,11 @@ class LaneEvidence:
     """From which tracks an inferred centre line was made, so that a driver can be left out of its own centre."""
 
     track_id: tuple[str, ...]
-    offset_m: Float32[np.ndarray, "track point"]  # to the left of the centre line; NaN where it was not seen
+    offset_m: Float[np.ndarray, "track point"]  # to the left of the centre line; NaN where it was not seen
 
     def __post_init__(self) -> None:
         """Check the shape and freeze the array."""
-        object.__setattr__(
-            self, "offset_m", frozen(self.offset_m, np.float32, (len(self.track_id), None), "offset_m")
-        )
+        object.__setattr__(self, "offset_m", frozen(self.offset_m, np.float32, (len(self.track_id), None), "offset_m"))
 
 
 @dataclass(frozen=True, eq=False)
@@ -29,16 +27,16 @@ class Lane:
     """One lane. Unknown numbers are NaN, unknown geometry is None, unknown neighbours are ""."""
 
     lane_id: str
-    centre_line_m: Float32[np.ndarray, "point 2"]  # in driving direction
+    centre_line_m: Float[np.ndarray, "point 2"]  # in driving direction
     width_m: float = float("nan")
     speed_limit_mps: float = float("nan")
-    left_boundary_m: Float32[np.ndarray, "left 2"] | None = None
-    right_boundary_m: Float32[np.ndarray, "right 2"] | None = None
+    left_boundary_m: Float[np.ndarray, "left 2"] | None = None
+    right_boundary_m: Float[np.ndarray, "right 2"] | None = None
     successors: tuple[str, ...] = ()
     left_neighbour: str = ""
     right_neighbour: str = ""
     in_junction: bool = False
-    stop_line_m: Float32[np.ndarray, "2 2"] | None = None
+    stop_line_m: Float[np.ndarray, "2 2"] | None = None
     evidence: LaneEvidence | None = None
 
     def __post_init__(self) -> None:
@@ -77,7 +75,7 @@ class Road:
 
     lanes: tuple[Lane, ...]
     source: str = "map"
-    crosswalks_m: tuple[Float32[np.ndarray, "corner 2"], ...] = ()
+    crosswalks_m: tuple[Float[np.ndarray, "corner 2"], ...] = ()
 
     def __post_init__(self) -> None:
         """Check that lane ids are unique and `source` is known."""

@@ -48,8 +48,8 @@ class Scenario(Spec):
     about: str
     duration_s: float = Field(gt=0)  # of an episode's log
     warm_up_s: float = Field(default=0.0, ge=0)  # simulated before it, not logged
-    parameters: dict[str, ScenarioParameter] = {}
-    options: dict[str, Any] = {}
+    parameters: dict[str, ScenarioParameter] = Field(default_factory=dict)
+    options: dict[str, Any] = Field(default_factory=dict)
     folder: Path = Path()
 
     def draw(self, rng: np.random.Generator) -> dict[str, float]:

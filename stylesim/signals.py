@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 from enum import IntEnum
 
 import numpy as np
-from jaxtyping import Int8
+from jaxtyping import Int
 
 from stylesim.arrays import frozen
 
@@ -27,7 +27,7 @@ class Signals:
 
     signal_id: tuple[str, ...]
     lane_id: tuple[tuple[str, ...], ...]  # empty: the link of light and lane is unknown
-    state: Int8[np.ndarray, "signal time"]
+    state: Int[np.ndarray, "signal time"]
 
     def __post_init__(self) -> None:
         """Check shapes and states, freeze the array."""

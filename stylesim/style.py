@@ -10,9 +10,7 @@ STYLE_CLASSES = ("aggressive", "reckless", "threatening", "careful", "cautious",
 CLASS_KNOB = {"aggressive": 1.0, "reckless": 0.6, "threatening": 0.2, "careful": -0.2, "cautious": -0.6, "timid": -1.0}
 
 # A class owns the stretch of the knob that is nearer to its place than to any other's.
-CLASS_INTERVAL = {
-    name: (max(-1.0, place - 0.2), min(1.0, place + 0.2)) for name, place in CLASS_KNOB.items()
-}
+CLASS_INTERVAL = {name: (max(-1.0, place - 0.2), min(1.0, place + 0.2)) for name, place in CLASS_KNOB.items()}
 
 
 def class_of_knob(aggressiveness: float) -> str:

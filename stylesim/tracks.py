@@ -6,7 +6,7 @@ from dataclasses import dataclass, field, replace
 from enum import IntEnum, IntFlag
 
 import numpy as np
-from jaxtyping import Bool, Float32, Float64, Int8, Int16, Int32
+from jaxtyping import Bool, Float, Int
 
 from stylesim.arrays import frozen
 from stylesim.style import DriverStyle
@@ -55,17 +55,17 @@ class Tracks:
     """
 
     agent_id: tuple[str, ...]
-    kind: Int8[np.ndarray, " agent"]
-    size_m: Float32[np.ndarray, "agent 2"]  # length, width
-    position_m: Float32[np.ndarray, "agent time 2"]
-    velocity_mps: Float32[np.ndarray, "agent time 2"]
-    heading_rad: Float32[np.ndarray, "agent time"]  # counter-clockwise from +x
+    kind: Int[np.ndarray, " agent"]
+    size_m: Float[np.ndarray, "agent 2"]  # length, width
+    position_m: Float[np.ndarray, "agent time 2"]
+    velocity_mps: Float[np.ndarray, "agent time 2"]
+    heading_rad: Float[np.ndarray, "agent time"]  # counter-clockwise from +x
     valid: Bool[np.ndarray, "agent time"]
     dt_s: float
-    origin_m: Float64[np.ndarray, " 2"] = field(default_factory=lambda: np.zeros(2))
+    origin_m: Float[np.ndarray, " 2"] = field(default_factory=lambda: np.zeros(2))
     driver: tuple[DriverStyle | None, ...] = ()
-    flags: Int32[np.ndarray, " agent"] | None = None
-    lookahead_steps: Int16[np.ndarray, "agent time"] | None = None
+    flags: Int[np.ndarray, " agent"] | None = None
+    lookahead_steps: Int[np.ndarray, "agent time"] | None = None
 
     def __post_init__(self) -> None:
         """Check shapes, give `driver` and `flags` their defaults, make every array read-only."""
@@ -107,7 +107,7 @@ class Tracks:
         return int(self.valid.shape[1])
 
     @property
-    def speed_mps(self) -> Float32[np.ndarray, "agent time"]:
+    def speed_mps(self) -> Float[np.ndarray, "agent time"]:
         """Length of the velocity, m/s; NaN where invalid."""
         return np.hypot(self.velocity_mps[..., 0], self.velocity_mps[..., 1])
 

@@ -3,4 +3,4 @@
 from stylesim.corpus.corpus import Corpus as Corpus
 from stylesim.corpus.corpus import SceneInfo as SceneInfo
 from stylesim.corpus.writer import CorpusWriter as CorpusWriter
-from stylesim.corpus.writer import PartWriter as PartWriter
+from stylesim.corpus.writer import write_part as write_part
