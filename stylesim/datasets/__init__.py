@@ -1,1 +1,9 @@
+"""Readers of recorded data: one module per foreign format, and `read`, which turns any of them into a corpus.
 
+A reader is a module with `scenes(path, **options) -> Iterator[Scene]`, listed in `formats.FORMATS`. It may use
+`recording.Recording` (a long table, one row per road user and frame) and `cutting.cut`; what it drops it counts.
+"""
+
+from stylesim.datasets.formats import FORMATS as FORMATS
+from stylesim.datasets.formats import DatasetFormat as DatasetFormat
+from stylesim.datasets.reading import read as read

@@ -1,0 +1,95 @@
+"""DLR Urban Traffic: one signalised intersection in Braunschweig, tracked at 20 Hz, lights at about 1 Hz.
+
+A recording is `trajectories_<begin>_<end>.csv.gz`, its lights are `traffic-lights_<begin>_<end>.csv.gz` beside
+it. Columns and state codes: data/README.md. Positions are UTM metres, yaw is in degrees counter-clockwise from
+east [read from the file: within 1.1 degrees of the velocity above 3 m/s]. There is no map: lanes come from the
+frozen road of the site (`site_roads`), or are inferred from the recording itself.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from itertools import pairwise
+from pathlib import Path
+
+import numpy as np
+from jaxtyping import Float64
+
+from stylesim.datasets.cutting import SCENE_S, cut
+from stylesim.datasets.dlr_tables import recording_from
+from stylesim.datasets.inferred_road import infer_road
+from stylesim.datasets.recording import Recording
+from stylesim.datasets.resampling import decimated
+from stylesim.datasets.site_roads import SiteRoad, load_site_road, site_road_at
+from stylesim.datasets.stamps import Stamp
+from stylesim.errors import InputError
+from stylesim.scene import Scene
+
+SOURCE = "dlr_ut"
+# Chosen: files whose names join within a minute are one continuous recording, hence one unit of splitting.
+JOINED_WITHIN_S = 60.0
+
+
+def scenes(path: str | Path, *, scene_s: float = SCENE_S, road: str = "site") -> Iterator[Scene]:
+    """The scenes of a recording, or of every recording in a folder, in time, at 10 Hz.
+
+    `road`: "site" takes the road that is shipped for the place where the recording begins, if there is one;
+    "infer" makes it from the whole recording (so it knows what comes after any t0: for looking, not for
+    forecasting); "none" gives scenes without lanes; anything else is a file that `save_site_road` wrote.
+    InputError names the file that is missing, damaged, or in other units.
+    """
+    files = _track_files(Path(path))
+    chosen = None if road in ("site", "infer", "none") else load_site_road(Path(road))
+    unit_id, unit_begin, previous = "", 0, None
+    for file in files:
+        stamp = Stamp.of(file)
+        raw, begin = recording_from(file, _lights_file(file), stamp)
+        if stamp is None or previous is None or not stamp.continues(previous, within_s=JOINED_WITHIN_S):
+            unit_id, unit_begin = raw.recording_id, begin
+        previous = stamp
+        site, origin = _site(road, chosen, raw)
+        yield from cut(
+            decimated(raw),
+            source=SOURCE,
+            scenario=site.name if site else "unknown_site",
+            unit_id=unit_id,
+            origin_m=origin,
+            road=site.road if site else None,
+            scene_s=scene_s,
+            unit_start_s=(begin - unit_begin) / 1e6,
+        )
+
+
+def _site(road: str, chosen: SiteRoad | None, raw: Recording) -> tuple[SiteRoad | None, Float64[np.ndarray, " 2"]]:
+    """The road to use and the origin of the scenes; both follow from where the recording begins, not from its end."""
+    begins_at = raw.position_m[np.argmin(raw.frame)]
+    if road == "infer":
+        origin = np.round(begins_at, -2)
+        return SiteRoad("inferred_site", infer_road(raw, origin), origin, {}), origin
+    site = chosen or (site_road_at(SOURCE, begins_at) if road == "site" else None)
+    return site, (np.round(begins_at, -2) if site is None else site.origin_m)
+
+
+def _track_files(path: Path) -> list[Path]:
+    if path.is_file():
+        return [path]
+    if not path.is_dir():
+        raise InputError(f"{path} does not exist; give a trajectories_*.csv.gz, or a folder of them")
+    files = sorted([*path.glob("trajectories_*.csv.gz"), *path.glob("trajectories_*.csv")])
+    if not files:
+        raise InputError(f"{path} holds no trajectories_*.csv.gz; it is no folder of DLR Urban Traffic")
+    for one, other in pairwise(files):
+        if one.name.split(".")[0] == other.name.split(".")[0]:
+            raise InputError(f"{one} and {other} are the same recording; remove one of them")
+    return files
+
+
+def _lights_file(tracks: Path) -> Path | None:
+    if not tracks.name.startswith("trajectories_"):
+        return None
+    stem = tracks.name.replace("trajectories_", "traffic-lights_", 1).split(".")[0]
+    for ending in (".csv.gz", ".csv"):
+        lights = tracks.with_name(stem + ending)
+        if lights.is_file():
+            return lights
+    return None
