@@ -1,0 +1,96 @@
+"""`evaluate`: hold one forecaster against one corpus, by style and by scenario."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Callable, Mapping
+from importlib.metadata import version
+from typing import Any
+
+from stylesim.corpus import Corpus
+from stylesim.errors import InputError
+from stylesim.evaluation.asking import STANDING_M, ask
+from stylesim.evaluation.intervals import DRAWS, LEVEL, MIN_DRIVERS, MIN_UNITS
+from stylesim.evaluation.metrics import MISS_THRESHOLD_M, MODES
+from stylesim.evaluation.results import Evaluation
+from stylesim.evaluation.slices import all_slices, driver_table
+from stylesim.evaluation.strata import with_strata
+from stylesim.forecast import Forecaster
+from stylesim.windows import WindowSpec
+
+
+def corpus_facts(corpus: Corpus) -> dict[str, Any]:
+    """What identifies a corpus in a report: name, fingerprint, scenes per split and source, units, its seed."""
+    return {
+        "name": corpus.path.name,
+        "fingerprint": corpus.fingerprint,
+        "scenes": len(corpus),
+        "units": len({info.unit_id for info in corpus.info}),
+        "splits": dict(sorted(Counter(info.split for info in corpus.info).items())),
+        "sources": dict(sorted(Counter(info.source for info in corpus.info).items())),
+        "seed": corpus.manifest.get("seed"),
+    }
+
+
+def evaluate(
+    forecaster: Forecaster,
+    corpus: Corpus,
+    *,
+    by: tuple[str, ...] = ("tdbm",),
+    spec: WindowSpec | None = None,
+    split: str | None = None,
+    seed: int = 0,
+    modes: int = MODES,
+    batch: int = 16,
+    within_site: bool = True,
+    progress: Callable[[int, int], None] | None = None,
+) -> Evaluation:
+    """Errors of `forecaster` on the windows of `corpus` (or of its `split`), per driver and per cell of `by`.
+
+    `by` holds strata: "tdbm", "kdsc" (class of the whole track), "tdbm:transposed", "history:tdbm" (class of the
+    history before t0), "scenario", "source", "kind", "commanded", or a product such as "tdbm*scenario". The
+    forecaster sees histories only; labels are joined to its errors afterwards. Standing agents (< 1 m in the future)
+    have a cell of their own and are in no other. `batch` tasks are given to `predict` at a time. `within_site=False`
+    refuses cells of fewer than 3 units altogether. `seed` is of the bootstrap.
+
+    Raises InputError for an unknown stratum, missing labels, an unknown split, a corpus without one window, or an
+    answer of the forecaster that is not what was asked.
+    """
+    spec = spec or WindowSpec()
+    view = corpus if split is None else corpus.split(split)
+    if batch < 1:
+        raise InputError(f"batch must be 1 or more, not {batch}")
+    windows, counts = ask(forecaster, view, spec=spec, modes=modes, batch=batch, progress=progress)
+    if windows.is_empty():
+        reasons = ", ".join(f"{name}: {count}" for name, count in counts.items() if count)
+        raise InputError(f"{corpus.path} has no window of {spec.history_s:g} s + {spec.future_s:g} s ({reasons})")
+    windows, provenance = with_strata(windows, view, by)
+    return Evaluation(
+        forecaster=forecaster.name,
+        by=tuple(by),
+        slices=all_slices(windows, tuple(by), seed=seed, within_site=within_site),
+        drivers=driver_table(windows),
+        about=_about(view, spec, provenance, seed=seed, modes=modes),
+        counts=counts,
+    )
+
+
+def _about(corpus: Corpus, spec: WindowSpec, provenance: Mapping[str, Any], *, seed: int, modes: int) -> dict[str, Any]:
+    return {
+        "corpus": corpus_facts(corpus),
+        "history_s": spec.history_s,
+        "future_s": spec.future_s,
+        "stride_s": spec.stride_s,
+        "modes": modes,
+        "miss_threshold_m": MISS_THRESHOLD_M,
+        "standing_m": STANDING_M,
+        "intervals": {
+            "level": LEVEL,
+            "draws": DRAWS,
+            "seed": seed,
+            "min_drivers": MIN_DRIVERS,
+            "min_units": MIN_UNITS,
+        },
+        "labels": dict(provenance),
+        "versions": {name: version(name) for name in ("stylesim", "numpy", "polars")},
+    }
