@@ -8,7 +8,7 @@ from jaxtyping import Bool, Float, Int
 
 def wrap_angle(angle_rad: Float[np.ndarray, "*any"]) -> Float[np.ndarray, "*any"]:
     """The same angles in [-pi, pi)."""
-    return np.remainder(angle_rad + np.pi, 2 * np.pi) - np.pi
+    return np.asarray(np.remainder(angle_rad + np.pi, 2 * np.pi) - np.pi)
 
 
 def rotated(points: Float[np.ndarray, "*any 2"], angle_rad: float) -> Float[np.ndarray, "*any 2"]:

@@ -98,6 +98,14 @@ def read_labels(corpus: Path, method: str, span: str, scene_ids: set[str] | None
     return _labels(table, about)
 
 
+def export_csv(corpus: Path, method: str, span: str, out: Path) -> int:
+    """Write the labels as CSV, whole or not at all; returns the number of rows. InputError if there are none."""
+    read_labels(corpus, method, span)  # checks that they are there and undamaged
+    table = read_parquet(_stem(corpus, method, span).with_name(f"{method}.{span}.parquet"))
+    write_whole(out, table.write_csv().encode())
+    return table.height
+
+
 def _labels(table: pl.DataFrame, about: Mapping[str, Any]) -> StyleLabels:
     classes, features = tuple(about["classes"]), tuple(about["features"])
     index = {name: i for i, name in enumerate(classes)} | {"undetermined": UNDETERMINED}

@@ -1,0 +1,101 @@
+"""`read`, `merge`, `verify`: corpora in and out."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import typer
+
+from stylesim.cli.console import err, progress_bar, say, show_table
+from stylesim.errors import InputError
+
+SHOWN_ERRORS = 20
+
+
+def options_of(pairs: list[str]) -> dict[str, str]:
+    """`key=value` items as a mapping."""
+    result = {}
+    for item in pairs:
+        key, equals, value = item.partition("=")
+        if not equals:
+            raise InputError(f"--option: expected KEY=VALUE, found {item!r}")
+        result[key.strip()] = value
+    return result
+
+
+def read(
+    format: str = typer.Argument(help="Format of the recording (see `stylesim list datasets`)."),
+    path: Path = typer.Argument(help="File or folder of the recording."),
+    out: Path = typer.Option(..., "--out", help="Folder of the new corpus; must not exist."),
+    option: list[str] = typer.Option([], "--option", "-o", help="The reader's own options, KEY=VALUE; repeatable."),
+    resume: bool = typer.Option(False, help="Go on from an unfinished run of the same request."),
+) -> None:
+    """Read a recorded data set into a new corpus; what was dropped is counted and said."""
+    from stylesim.datasets.reading import read as run
+
+    with progress_bar(f"reading {format}", "scenes") as progress:
+        corpus = run(format, path, out=out, resume=resume, progress=progress, **options_of(option))
+    show_table("Counted", ("what", "n"), sorted(corpus.manifest["counts"].items()))
+    say(f"{len(corpus)} scenes, {corpus.manifest['n_agents']} tracks, {corpus.manifest['n_steps']} agent-steps: {out}")
+
+
+def merge(
+    corpus: list[Path] = typer.Argument(help="Corpora to merge."),
+    out: Path = typer.Option(..., "--out", help="Folder of the new corpus; must not exist."),
+    balance: str = typer.Option("none", help="Sampling weights of the training split: none, tdbm or source."),
+    split: str = typer.Option("0.8,0.1,0.1", help="Shares of train, val, test; by recording or episode."),
+    noise: str = typer.Option("none", help="none, or fit: make simulated tracks as noisy as the recorded ones."),
+    seed: int = typer.Option(0, min=0, help="Same seed, same bytes."),
+) -> None:
+    """Merge corpora: one clock, one frame, split by recording, styles balanced by weights."""
+    from stylesim.corpus import Corpus
+    from stylesim.merging.merge import merge as run
+
+    try:
+        parts = tuple(float(value) for value in split.split(","))
+    except ValueError:
+        raise InputError(f"--split: expected three numbers like 0.8,0.1,0.1, found {split!r}") from None
+    if len(parts) != 3:
+        raise InputError(f"--split: expected three numbers like 0.8,0.1,0.1, found {split!r}")
+    with progress_bar("merging", "scenes") as progress:
+        merged = run(
+            [Corpus(path) for path in corpus],
+            balance=balance,
+            split=(parts[0], parts[1], parts[2]),
+            seed=seed,
+            out=out,
+            noise=None if noise == "none" else noise,
+            progress=progress,
+        )
+    rows = []
+    for name in ("train", "val", "test"):
+        infos = [info for info in merged.info if info.split == name]
+        units = len({(info.source, info.unit_id) for info in infos})
+        rows.append((name, len(infos), units, sum(info.n_agents for info in infos)))
+    show_table("Splits", ("split", "scenes", "units", "tracks"), rows)
+    show_table("Counted", ("what", "n"), sorted(merged.manifest["counts"].items()))
+    say(f"{out}")
+
+
+def verify(path: Path = typer.Argument(help="A corpus.")) -> None:
+    """Check a corpus: checksums, schema, physics. Exits with 1 and what it found if something is wrong."""
+    from stylesim.corpus.verify import verify as run
+
+    with progress_bar("verifying", "scenes") as progress:
+        result = run(path, progress=progress)
+    show_table("Counted", ("what", "n"), sorted(result.counts.items()))
+    for line in result.errors[:SHOWN_ERRORS]:
+        err(line)
+    if len(result.errors) > SHOWN_ERRORS:
+        err(f"… and {len(result.errors) - SHOWN_ERRORS} more")
+    if not result.ok:
+        err(f"{path}: {len(result.errors)} problem(s)")
+        raise typer.Exit(1)
+    say(f"{path}: sound")
+
+
+def add_to(app: typer.Typer) -> None:
+    """Register the verbs."""
+    app.command("read")(read)
+    app.command("merge")(merge)
+    app.command("verify")(verify)

@@ -1,0 +1,76 @@
+"""`generate`: traffic with drivers of chosen styles."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import typer
+
+from stylesim.cli.console import progress_bar, say, show_table
+from stylesim.errors import InputError, unknown
+from stylesim.population import Population
+from stylesim.style import STYLE_CLASSES
+
+
+def shares(text: str, option: str) -> dict[str, float]:
+    """`aggressive=0.3,careful=0.7` as a mapping. InputError for anything else, naming the nearest style."""
+    result: dict[str, float] = {}
+    for item in text.split(","):
+        name, equals, value = item.partition("=")
+        name = name.strip()
+        if not equals:
+            raise InputError(f"{option}: expected STYLE=SHARE, found {item!r}")
+        if name not in STYLE_CLASSES:
+            raise unknown("style", name, STYLE_CLASSES, where=option)
+        if name in result:
+            raise InputError(f"{option}: {name!r} is given twice")
+        try:
+            result[name] = float(value)
+        except ValueError:
+            raise InputError(f"{option}: the share of {name!r} is no number: {value!r}") from None
+    return result
+
+
+def chosen_population(population: str | None, styles: str | None, reweight: str | None) -> Population:
+    """The population that the three options describe. InputError where they contradict each other."""
+    if styles is not None:
+        if population is not None or reweight is not None:
+            raise InputError("--styles gives every share; it cannot go with --population or --reweight")
+        return Population.of(**shares(styles, "--styles"))
+    base = Population.load(population or "tdbm_spectrum")
+    return base.reweighted(**shares(reweight, "--reweight")) if reweight is not None else base
+
+
+def generate(
+    scenario: list[str] = typer.Argument(help="Scenarios by name (see `stylesim list scenarios`) or by folder."),
+    out: Path = typer.Option(..., "--out", help="Folder of the new corpus; must not exist."),
+    population: str = typer.Option(None, help="A population's name or YAML file.", show_default="tdbm_spectrum"),
+    styles: str = typer.Option(None, help="All shares, sum 1: aggressive=0.3,careful=0.7."),
+    reweight: str = typer.Option(None, help="Set some shares, scale the rest: aggressive=0.3."),
+    episodes: int = typer.Option(10, min=1, help="Episodes per scenario."),
+    seed: int = typer.Option(0, min=0, help="Same seed, same bytes."),
+    workers: int = typer.Option(1, min=1, help="Simulations side by side, one process each."),
+    resume: bool = typer.Option(False, help="Go on from an unfinished run of the same request."),
+) -> None:
+    """Generate traffic with drivers of chosen styles into a new corpus."""
+    from stylesim.simulation.generate import generate as run
+
+    crowd = chosen_population(population, styles, reweight)
+    with progress_bar("generating", "episodes") as progress:
+        corpus = run(
+            scenario, crowd, episodes=episodes, seed=seed, out=out, workers=workers, resume=resume, progress=progress
+        )
+    counts = corpus.manifest["counts"]
+    drivers = {name: counts.get(f"drivers.{name}", 0) for name in STYLE_CLASSES}
+    total = max(1, sum(drivers.values()))
+    rows = [(name, n, f"{n / total:.3f}", f"{crowd.by_class[name]:.3f}") for name, n in drivers.items()]
+    show_table("Drivers", ("style", "drivers", "share", "asked for"), rows)
+    others = {key: n for key, n in sorted(counts.items()) if not key.startswith("drivers.") and n}
+    if others:
+        show_table("Counted", ("what", "n"), list(others.items()))
+    say(f"{len(corpus)} episodes, {corpus.manifest['n_steps']} vehicle-steps: {out}")
+
+
+def add_to(app: typer.Typer) -> None:
+    """Register the verb."""
+    app.command("generate")(generate)

@@ -1,0 +1,75 @@
+"""`label`, `labels`: styles of every track, and the table that users join to their own data."""
+
+from __future__ import annotations
+
+from collections import Counter
+from enum import StrEnum
+from pathlib import Path
+
+import typer
+
+from stylesim.cli.console import progress_bar, say, show_table
+from stylesim.labels import StyleLabels
+from stylesim.windows import WindowSpec
+
+
+class Method(StrEnum):
+    """The labelling methods."""
+
+    tdbm = "tdbm"
+    kdsc = "kdsc"
+
+
+def _shares(labels: StyleLabels) -> list[tuple[str, int, str]]:
+    names = Counter(labels.class_name(row) for row in range(len(labels)))
+    return [
+        (name, names[name], f"{names[name] / max(1, len(labels)):.3f}") for name in (*labels.classes, "undetermined")
+    ]
+
+
+def label(
+    corpus: Path = typer.Argument(help="A corpus."),
+    method: Method = typer.Option(Method.tdbm, help="How to label."),
+    fit: Path = typer.Option(
+        None, help="Corpus to fit scaler or clusters on; without it the shipped reference (never the judged corpus)."
+    ),
+    window: float = typer.Option(WindowSpec().history_s, help="History in seconds of the window labels."),
+    future: float = typer.Option(WindowSpec().future_s, help="Future in seconds that a forecaster will be asked for."),
+    stride: float = typer.Option(WindowSpec().stride_s, help="Seconds from one t0 to the next."),
+) -> None:
+    """Label every track, and every history window, by driving style."""
+    from stylesim.corpus import Corpus
+    from stylesim.labelers.labelling import label as run
+    from stylesim.labelers.reference import default_labeler, new_labeler
+
+    spec = WindowSpec(window, future, stride)
+    if fit is None:
+        labeler = default_labeler(method.value)
+    else:
+        with progress_bar(f"fitting {method.value} on {fit.name}", "scenes") as progress:
+            labeler = new_labeler(method.value).fit(Corpus(fit), spec=spec, progress=progress)
+    with progress_bar(f"labelling {corpus.name} by {method.value}", "scenes") as progress:
+        labels = run(Corpus(corpus), labeler, spec=spec, progress=progress)
+    show_table(f"{method.value}: {len(labels)} tracks", ("style", "tracks", "share"), _shares(labels))
+    say(f"{corpus / 'labels'}")
+
+
+def labels(
+    corpus: Path = typer.Argument(help="A labelled corpus."),
+    join: Path = typer.Option(
+        ..., help="CSV to write: one row per label, with the source's own scenario and track ids."
+    ),
+    method: Method = typer.Option(Method.tdbm, help="Which labels."),
+    span: str = typer.Option("track", help="track (whole tracks) or history (windows that end at t0)."),
+) -> None:
+    """Write labels as a CSV that joins to your own data by source_scenario_id and source_track_id."""
+    from stylesim.corpus.label_store import export_csv
+
+    rows = export_csv(corpus, method.value, span, join)
+    say(f"{rows} rows: {join}")
+
+
+def add_to(app: typer.Typer) -> None:
+    """Register the verbs."""
+    app.command("label")(label)
+    app.command("labels")(labels)

@@ -1,0 +1,76 @@
+"""Do position, velocity and heading of a track agree with each other, and does nothing teleport?"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from jaxtyping import Bool
+
+from stylesim.geometry import box_corners, boxes_overlap, wrap_angle
+from stylesim.tracks import Tracks
+
+MAX_SPEED_MPS = 75.0  # chosen, because 270 km/h is beyond public roads
+MAX_VELOCITY_ERROR_MPS = 3.0  # chosen: several times the noise of camera and lidar trackers (about 0.5 m/s)
+MAX_SLIP_RAD = np.deg2rad(60.0)  # chosen: no road car slides at such an angle
+MOVING_MPS = 3.0  # below it a heading cannot be told from noise; chosen
+
+
+@dataclass(frozen=True, eq=False)
+class Implausible:
+    """Where a scene contradicts physics, per agent and frame."""
+
+    teleport: Bool[np.ndarray, "agent time"]
+    velocity: Bool[np.ndarray, "agent time"]
+    heading: Bool[np.ndarray, "agent time"]
+
+    @property
+    def agents(self) -> Bool[np.ndarray, " agent"]:
+        """Agents with any such frame."""
+        return (self.teleport | self.velocity | self.heading).any(axis=1)
+
+
+def implausible(tracks: Tracks) -> Implausible:
+    """Frames that jump faster than MAX_SPEED_MPS, whose velocity differs from the displacement, or that slide.
+
+    Velocity is held against the displacement over one frame, by the mean of the velocities at its two ends.
+    Headings are judged for motor vehicles above MOVING_MPS only.
+    """
+    both = tracks.valid[:, 1:] & tracks.valid[:, :-1]
+    moved = np.diff(tracks.position_m.astype(np.float64), axis=1) / tracks.dt_s
+    meant = (tracks.velocity_mps[:, 1:] + tracks.velocity_mps[:, :-1]) / 2
+    zero = np.zeros(tracks.valid.shape, bool)
+    teleport, velocity, heading = zero.copy(), zero.copy(), zero.copy()
+    with np.errstate(invalid="ignore"):
+        teleport[:, 1:] = both & (np.hypot(moved[..., 0], moved[..., 1]) > MAX_SPEED_MPS)
+        error = np.hypot(*np.moveaxis(moved - meant, -1, 0))
+        velocity[:, 1:] = both & ~teleport[:, 1:] & (error > MAX_VELOCITY_ERROR_MPS)
+        course = np.arctan2(tracks.velocity_mps[..., 1], tracks.velocity_mps[..., 0])
+        slip = np.abs(wrap_angle(course - tracks.heading_rad))
+        fast = tracks.valid & tracks.is_motor[:, None] & (tracks.speed_mps > MOVING_MPS)
+        heading[:] = fast & (slip > MAX_SLIP_RAD)
+    return Implausible(teleport, velocity, heading)
+
+
+def overlapping_pairs(tracks: Tracks, *, every: int = 1) -> int:
+    """How many pairs of motor vehicles' boxes overlap in at least one of every `every`-th frame."""
+    pairs: set[tuple[int, int]] = set()
+    motor = np.flatnonzero(tracks.is_motor)
+    for frame in range(0, tracks.n_frames, every):
+        here = motor[tracks.valid[motor, frame]]
+        if len(here) < 2:
+            continue
+        centre = tracks.position_m[here, frame].astype(np.float64)
+        reach = np.hypot(tracks.size_m[here, 0], tracks.size_m[here, 1]) / 2
+        order = np.argsort(centre[:, 0], kind="stable")
+        x, r = centre[order, 0], float(reach.max())
+        stop = np.searchsorted(x, x + 2 * r, side="right")
+        first = np.repeat(np.arange(len(here)), stop - np.arange(len(here)) - 1)
+        second = np.concatenate([np.arange(i + 1, stop[i]) for i in range(len(here))]).astype(np.int64)
+        a, b = order[first], order[second]
+        near = np.hypot(*(centre[a] - centre[b]).T) < reach[a] + reach[b]
+        a, b = a[near], b[near]
+        corners = box_corners(centre, tracks.heading_rad[here, frame].astype(np.float64), tracks.size_m[here])
+        hit = boxes_overlap(corners[a], corners[b])
+        pairs |= {(int(min(i, j)), int(max(i, j))) for i, j in zip(here[a[hit]], here[b[hit]], strict=True)}
+    return len(pairs)
