@@ -57,7 +57,7 @@ def label(
 def labels(
     corpus: Path = typer.Argument(help="A labelled corpus."),
     join: Path = typer.Option(
-        ..., help="CSV to write: one row per label, with the source's own scenario and track ids."
+        ..., help="CSV to write: one row per label, with the source's own ids."
     ),
     method: Method = typer.Option(Method.tdbm, help="Which labels."),
     span: str = typer.Option("track", help="track (whole tracks) or history (windows that end at t0)."),

@@ -1,0 +1,5 @@
+"""`python -m stylesim`: the command line."""
+
+from stylesim.cli import main
+
+main()
