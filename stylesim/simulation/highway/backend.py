@@ -1,0 +1,78 @@
+"""`HighwayBackend`: one episode of a highway-env scenario as a `Scene`."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from stylesim.population import Population
+from stylesim.randomness import stream
+from stylesim.scenario import Scenario
+from stylesim.scene import Scene
+from stylesim.simulation.highway.lanes import road_of
+from stylesim.simulation.highway.log import TrackLog
+from stylesim.simulation.highway.spec import LOG_HZ, options_of
+from stylesim.simulation.highway.traffic import Crew, JunctionTraffic, Traffic, highway_traffic
+from stylesim.tracks import TrackFlag, Tracks
+
+SOURCE = "highway_env"
+JUNCTION_NODES = "i"  # highway-env names the inner nodes of its intersection il0, ir0, ...
+
+
+class HighwayBackend:
+    """Runs scenarios of the layouts `highway` and `intersection`; holds nothing between episodes."""
+
+    name = "highway"
+
+    def prepare(self, scenario: Scenario) -> None:
+        """Check that the scenario can be run; InputError naming file and key if not."""
+        options_of(scenario)
+
+    def run_episode(self, scenario: Scenario, population: Population, *, seed: int, episode: int) -> Scene:
+        """One episode at 10 Hz; the same arguments give the same scene. InputError for options that do not fit."""
+        options = options_of(scenario)
+        drawn = scenario.draw(stream(seed, episode, "", "parameters"))
+        crew = Crew(population, seed=seed, episode=episode)
+        junction = options.layout == "intersection"
+        time_s = scenario.warm_up_s + scenario.duration_s
+        traffic = (
+            JunctionTraffic(options, drawn, crew)
+            if junction
+            else highway_traffic(options, drawn, crew, time_s=time_s)
+        )
+        n_frames = round(scenario.duration_s * LOG_HZ)
+        log = TrackLog(n_frames, 1.0 / LOG_HZ)
+        for _ in range(round(scenario.warm_up_s * options.simulation_hz)):
+            traffic.advance()
+        early = len(traffic.removed)
+        for _ in range(n_frames):
+            log.add(traffic.road.vehicles)
+            for _ in range(options.simulation_hz // LOG_HZ):
+                traffic.advance()
+        tracks = log.tracks(set(traffic.removed))
+        scene_id = f"{scenario.name}-{seed}-{episode:05d}"
+        return Scene(
+            scene_id=scene_id,
+            unit_id=scene_id,
+            source=SOURCE,
+            scenario=scenario.name,
+            tracks=tracks,
+            road=road_of(traffic.road.network, junction_nodes=JUNCTION_NODES if junction else ""),
+            counts=_counts(tracks, traffic, log, removed_before_log=early),
+            parameters=drawn,
+        )
+
+    def close(self) -> None:
+        """Nothing is held."""
+
+
+def _counts(tracks: Tracks, traffic: Traffic, log: TrackLog, *, removed_before_log: int) -> dict[str, int]:
+    """What happened, as whole numbers; `collisions` are pairs that touched, the others are cars."""
+    reasons = traffic.removals()
+    return {
+        "collisions": len([pair for pair in traffic.road.collided_pairs if pair & set(log.vehicles)]),
+        "collided": int(np.count_nonzero(tracks.flagged(TrackFlag.COLLIDED))),
+        "emergency_braked": int(np.count_nonzero(tracks.flagged(TrackFlag.EMERGENCY_BRAKED))),
+        "removed_crashed": reasons["crashed"],
+        "removed_off_road": reasons["off_road"],
+        "removed_before_log": removed_before_log,
+    }

@@ -1,0 +1,81 @@
+"""What lies ahead of a car on its own path: the next lanes of its route, gaps along it, the speed of its curves."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from typing import Any
+
+from highway_env.road.lane import AbstractLane, CircularLane
+
+STRIP_M = 0.5  # a car whose centre is this far outside a lane still reaches into it (half a car is 1 m wide)
+LANES_AHEAD = 2  # through the junction and onto the exit
+ALIGNED_RAD = math.radians(60)  # who crosses is the regulation's business, who goes along is a leader
+STANDING_MPS = 0.5
+
+
+def lanes_ahead(vehicle: Any) -> Iterator[tuple[float, AbstractLane]]:
+    """(distance of its start from the vehicle, lane) for the lanes that follow on its route, nearest first."""
+    if not vehicle.route:
+        return
+    index = vehicle.target_lane_index
+    lane = vehicle.road.network.get_lane(index)
+    start = lane.length - lane.local_coordinates(vehicle.position)[0]
+    legs = [leg for leg in vehicle.route if leg[:2] != index[:2]]
+    for leg in legs[:LANES_AHEAD]:
+        if leg[0] != index[1]:
+            return
+        index, lane = leg, vehicle.road.network.get_lane(leg)
+        yield start, lane
+        start += lane.length
+
+
+def reaches_into(lane: AbstractLane, along_m: float, lateral_m: float) -> bool:
+    """True where a car at these lane coordinates occupies part of the lane."""
+    inside = -lane.VEHICLE_LENGTH / 2 <= along_m < lane.length + lane.VEHICLE_LENGTH / 2
+    return bool(inside and abs(lateral_m) <= lane.width_at(along_m) / 2 + STRIP_M)
+
+
+def leader_beyond(vehicle: Any) -> Any:
+    """The nearest car that goes along, or stands, on the next lanes of the vehicle's route; None if there is none."""
+    best, nearest = None, math.inf
+    for start, lane in lanes_ahead(vehicle):
+        for other in vehicle.road.vehicles:
+            if other is vehicle:
+                continue
+            along, lateral = lane.local_coordinates(other.position)
+            if start + along >= nearest or start + along <= 0 or not reaches_into(lane, along, lateral):
+                continue
+            if other.speed < STANDING_MPS or abs(lane.local_angle(other.heading, along)) < ALIGNED_RAD:
+                best, nearest = other, start + along
+    return best
+
+
+def path_gap_m(vehicle: Any, other: Any) -> float:
+    """Distance between the centres of two cars along the path of the first, m; negative if the other is behind."""
+    own = vehicle.lane
+    along, lateral = own.local_coordinates(other.position)
+    if not getattr(vehicle, "route", None) or reaches_into(own, along, lateral):
+        return float(along - own.local_coordinates(vehicle.position)[0])
+    for start, lane in lanes_ahead(vehicle):
+        ahead, aside = lane.local_coordinates(other.position)
+        if reaches_into(lane, ahead, aside):
+            return float(start + ahead)
+    return float(along - own.local_coordinates(vehicle.position)[0])
+
+
+def curve_speed_mps(vehicle: Any, comfort_mps2: float) -> float:
+    """Speed that keeps the lateral acceleration within `comfort_mps2` in this curve and can be reached before the next.
+
+    v = sqrt(a r) in a curve of radius r; sqrt(v^2 + 2 a d) at distance d before it. The longitudinal comfort is
+    taken for the lateral one too (a friction circle) [ours]. Infinite on straight roads.
+    """
+    if not getattr(vehicle, "route", None):
+        return math.inf
+    here = vehicle.road.network.get_lane(vehicle.target_lane_index)
+    result = math.sqrt(comfort_mps2 * here.radius) if isinstance(here, CircularLane) else math.inf
+    for start, lane in lanes_ahead(vehicle):
+        if isinstance(lane, CircularLane):
+            curve = comfort_mps2 * lane.radius
+            result = min(result, math.sqrt(curve + 2 * comfort_mps2 * max(start, 0.0)))
+    return result
