@@ -24,7 +24,7 @@ HEADINGS = {
     "min_fde_m": "minFDE (m)",
     "miss_rate": "miss rate",
     "brier_fde_m": "brierFDE (m)",
-    "top_fde_m": "FDE of the most probable mode (m)",
+    "top_fde_m": "top-1 FDE (m)",
 }
 
 

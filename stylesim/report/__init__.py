@@ -1,1 +1,1 @@
-
+"""Tables, figures and the HTML report; the only package that imports plotting."""

@@ -1,0 +1,133 @@
+"""A scene seen from above: its road, and its tracks as dots 0.1 s apart, coloured by style."""
+
+from __future__ import annotations
+
+from collections import Counter
+from typing import Literal
+
+import numpy as np
+from jaxtyping import Bool, Float64
+from matplotlib.axes import Axes
+from matplotlib.collections import LineCollection, PolyCollection
+from matplotlib.figure import Figure
+
+from stylesim.evaluation.slices import value_order
+from stylesim.geometry import box_corners
+from stylesim.labels import StyleLabels
+from stylesim.report.theme import FAINT, INK, SURFACE, drawing, style_colour
+from stylesim.road import Lane, Road
+from stylesim.scene import Scene
+
+WINDOW_S = 11.0  # the window of a track label (REFERENCE section 1)
+DOT_S = 0.1
+MARGIN_M = 12.0  # chosen: some road around the tracks
+WIDTH = 8.6
+
+
+def busiest_frames(scene: Scene, seconds: float = WINDOW_S) -> tuple[int, int]:
+    """The stretch of that length with the most road users in sight: (first frame, one past the last)."""
+    length = min(scene.tracks.n_frames, max(1, round(seconds / scene.tracks.dt_s)))
+    seen = np.concatenate([[0], np.cumsum(scene.tracks.valid.sum(axis=0))])
+    start = int(np.argmax(seen[length:] - seen[:-length]))
+    return start, start + length
+
+
+def agent_styles(scene: Scene, labels: StyleLabels | None) -> tuple[str, ...]:
+    """The class of each agent: as labelled, without labels as commanded; "unlabelled" or "not commanded" if neither."""
+    if labels is None:
+        return tuple("not commanded" if driver is None else driver.name for driver in scene.tracks.driver)
+    found = {
+        agent: labels.class_name(row)
+        for row, (scene_id, agent) in enumerate(zip(labels.scene_id, labels.agent_id, strict=True))
+        if scene_id == scene.scene_id
+    }
+    return tuple(found.get(agent, "unlabelled") for agent in scene.tracks.agent_id)
+
+
+def _ribbon(lane: Lane) -> Float64[np.ndarray, "corner 2"] | None:
+    """The lane's surface, from its boundaries or its width; None where neither is known."""
+    if lane.left_boundary_m is not None and lane.right_boundary_m is not None:
+        return np.concatenate([lane.left_boundary_m, lane.right_boundary_m[::-1]]).astype(np.float64)
+    if not np.isfinite(lane.width_m):
+        return None
+    line = lane.centre_line_m.astype(np.float64)
+    tangent = np.gradient(line, axis=0)
+    tangent /= np.maximum(np.linalg.norm(tangent, axis=1, keepdims=True), 1e-9)
+    normal = np.stack([-tangent[:, 1], tangent[:, 0]], axis=1) * lane.width_m / 2
+    return np.concatenate([line + normal, (line - normal)[::-1]])
+
+
+def _draw_road(axes: Axes, road: Road) -> None:
+    ribbons = [ribbon for lane in road.lanes if (ribbon := _ribbon(lane)) is not None]
+    axes.add_collection(PolyCollection(ribbons, facecolors=SURFACE, edgecolors=FAINT, linewidths=0.5, zorder=1))
+    centres = [lane.centre_line_m for lane in road.lanes]
+    axes.add_collection(LineCollection(centres, colors="#B8C0C8", linewidths=0.5, linestyles=(0, (6, 5)), zorder=2))
+    walks = [walk for walk in road.crosswalks_m if len(walk) >= 3]
+    axes.add_collection(PolyCollection(walks, facecolors="#F7E8C8", edgecolors="#D8C79A", linewidths=0.5, zorder=2))
+    stops = [lane.stop_line_m for lane in road.lanes if lane.stop_line_m is not None]
+    axes.add_collection(LineCollection(stops, colors=INK, linewidths=1.6, zorder=3))
+
+
+def _draw_tracks(axes: Axes, scene: Scene, styles: tuple[str, ...], shown: Bool[np.ndarray, "agent time"]) -> None:
+    tracks = scene.tracks
+    for name in sorted(set(styles), key=value_order):
+        chosen = np.array([style == name for style in styles])
+        dots = tracks.position_m[chosen][shown[chosen]]
+        axes.scatter(dots[:, 0], dots[:, 1], s=4.0, color=style_colour(name), linewidths=0, zorder=4)
+        last = [(agent, int(np.flatnonzero(shown[agent])[-1])) for agent in np.flatnonzero(chosen & shown.any(axis=1))]
+        boxes = [
+            box_corners(tracks.position_m[a, f], tracks.heading_rad[a, f], tracks.size_m[a])
+            for a, f in last
+            if np.isfinite(tracks.size_m[a]).all() and np.isfinite(tracks.heading_rad[a, f])
+        ]
+        axes.add_collection(
+            PolyCollection(boxes, facecolors=style_colour(name), edgecolors="white", linewidths=0.4, zorder=5)
+        )
+
+
+def scene_figure(
+    scene: Scene,
+    labels: StyleLabels | None = None,
+    *,
+    frames: tuple[int, int] | None = None,
+    legend: Literal["measured", "commanded"] | None = None,
+) -> Figure:
+    """The tracks of `frames` (by default the busiest 11 s) on the road, coloured by class.
+
+    Colours are the labelled class, or the commanded one where `labels` is None. Boxes stand where a road user is last
+    seen in the window. `legend` overrides what the title calls the colours. ValueError where no frame is in `frames`.
+    """
+    tracks = scene.tracks
+    first, stop = frames or busiest_frames(scene)
+    if not 0 <= first < stop <= tracks.n_frames:
+        raise ValueError(f"frames [{first}, {stop}) are not within 0..{tracks.n_frames}")
+    every = max(1, round(DOT_S / tracks.dt_s))
+    shown = np.zeros_like(tracks.valid)
+    shown[:, first:stop:every] = tracks.valid[:, first:stop:every]
+    styles = agent_styles(scene, labels)
+    seen = Counter(style for style, any_ in zip(styles, np.asarray(shown.any(axis=1)).tolist(), strict=True) if any_)
+    points = tracks.position_m[shown]
+    low, high = (points.min(axis=0), points.max(axis=0)) if len(points) else (np.zeros(2), np.ones(2))
+    low, high = low - MARGIN_M, high + MARGIN_M
+    span = high - low
+    with drawing():
+        height = float(np.clip(WIDTH * 0.8 * span[1] / span[0] + 1.2, 2.0, 8.0))
+        figure = Figure(figsize=(WIDTH, height), layout="constrained")
+        axes = figure.subplots()
+        if scene.road is not None:
+            _draw_road(axes, scene.road)
+        _draw_tracks(axes, scene, styles, shown)
+        for name in sorted(seen, key=value_order):
+            axes.scatter([], [], s=24, color=style_colour(name), linewidths=0, label=f"{name}, n = {seen[name]}")
+        axes.set_aspect("equal")
+        axes.set_xlim(float(low[0]), float(high[0]))
+        axes.set_ylim(float(low[1]), float(high[1]))
+        axes.grid(visible=False)
+        axes.set_xlabel("x, east (m)")
+        axes.set_ylabel("y, north (m)")
+        colour = legend or ("commanded" if labels is None else "measured")
+        what = f"{labels.method.upper()} class" if labels is not None else "class"
+        seconds = (stop - first) * tracks.dt_s
+        axes.set_title(f"{scene.scene_id}: {seconds:.0f} s of traffic, one dot per {DOT_S:g} s, by {colour} {what}")
+        axes.legend(loc="upper left", bbox_to_anchor=(1.0, 1.0))
+    return figure

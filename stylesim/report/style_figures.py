@@ -1,0 +1,124 @@
+"""Figures of styles: class shares, commanded against measured, and the decision at the yellow."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from scipy.special import expit
+
+from stylesim.evaluation.label_summary import RANK_CEILING, LabelSummary, SourceSummary
+from stylesim.evaluation.yellow import YellowDecisions
+from stylesim.report.theme import SERIES_COLOUR, UNJUDGED_COLOUR, drawing, new_figure, style_colour, style_marker
+from stylesim.style import STYLE_CLASSES
+
+WIDTH = 8.6
+NEUTRAL_YELLOW = (2.14, 2.88)  # (k 1/s, m s), REFERENCE section 5: Rakha et al. 2007, drivers under 40
+YELLOW_BIN_S = 1.0  # chosen: six styles share the decisions, narrower bins would hold too few
+MIN_BIN = 10  # chosen: a share of fewer decisions than this is not drawn
+
+
+def _share_panel(axes: Axes, sources: Sequence[tuple[str, SourceSummary]], title: str, *, transposed: bool) -> None:
+    shown = [(name, one.classes_transposed if transposed else one.classes) for name, one in sources]
+    classes = list(shown[0][1])
+    height = 0.8 / len(shown)
+    for number, (name, counts) in enumerate(shown):
+        n = sum(counts.values())
+        share = [100 * counts[c] / n if n else 0.0 for c in classes]
+        y = np.arange(len(classes)) - 0.4 + height * (number + 0.5)
+        label = f"{name}, n = {n}"
+        axes.barh(y, share, height=height * 0.9, color=SERIES_COLOUR[number % len(SERIES_COLOUR)], label=label)
+        for place, value in zip(y, share, strict=True):
+            axes.annotate(
+                f"{value:.0f}", (value, place), xytext=(3, 0), textcoords="offset points", va="center", size=7
+            )
+    axes.set_yticks(range(len(classes)), classes)
+    axes.invert_yaxis()
+    axes.grid(visible=False, axis="y")
+    axes.set_xlabel("share of tracks (%)")
+    axes.margins(x=0.12)
+    axes.set_title(title)
+
+
+def class_distribution_figure(summaries: Sequence[LabelSummary]) -> Figure | None:
+    """Class shares of one method per source; for TDBM in both orientations side by side. None without a track."""
+    several = len({s.corpus for s in summaries}) > 1
+    sources = [(f"{one.source} ({s.corpus})" if several else one.source, one) for s in summaries for one in s.sources]
+    sources = [(name, one) for name, one in sources if one.n]
+    if not sources:
+        return None
+    both = all(one.classes_transposed for _, one in sources)
+    method = summaries[0].method.upper()
+    with drawing():
+        rows = len(sources[0][1].classes) * max(len(sources), 2) * 0.16
+        figure, panels = new_figure(WIDTH, 1.6 + rows, columns=2 if both else 1)
+        if both:
+            _share_panel(panels[0], sources, f"{method}, printed orientation (s = B·x)", transposed=False)
+            _share_panel(panels[1], sources, f"{method}, transposed (s = Bᵀ·x)", transposed=True)
+        else:
+            _share_panel(panels[0], sources, f"{method} classes by source", transposed=False)
+        handles, names = panels[0].get_legend_handles_labels()
+        figure.legend(handles, names, loc="outside lower center", ncols=min(3, len(names)))
+    return figure
+
+
+def confusion_figure(summary: LabelSummary) -> Figure | None:
+    """Commanded class against measured class, in % of each commanded row; None where nobody was commanded."""
+    confusion = summary.confusion
+    if confusion is None:
+        return None
+    share = confusion.share
+    with drawing():
+        figure, (axes,) = new_figure(WIDTH * 0.78, 3.9)
+        axes.imshow(np.nan_to_num(100 * share), cmap="Blues", vmin=0, vmax=100, aspect="auto")
+        for row, column in np.ndindex(confusion.count.shape):
+            if np.isfinite(share[row, column]):
+                text, dark = f"{100 * share[row, column]:.0f}", share[row, column] > 0.55
+                axes.text(column, row, text, ha="center", va="center", color="white" if dark else "#1F2933", size=9)
+        totals = confusion.count.sum(axis=1)
+        axes.set_yticks(
+            range(len(totals)), [f"{c} (n = {n})" for c, n in zip(confusion.commanded, totals, strict=True)]
+        )
+        axes.set_xticks(range(len(confusion.measured)), confusion.measured, rotation=25, ha="right")
+        axes.grid(visible=False)
+        axes.set_xlabel("measured class")
+        axes.set_ylabel("commanded class")
+        rank = confusion.knob_rank_correlation
+        note = f"; knob and measured aggressiveness: Spearman {rank:.2f}" if np.isfinite(rank) else ""
+        axes.set_title(f"Measured {summary.method.upper()} class of commanded drivers (% of row){note}", size=9)
+    return figure
+
+
+def rank_note() -> str:
+    """What to hold a Spearman of classes against (REFERENCE section 1 [computed])."""
+    low, high = RANK_CEILING
+    return f"Even with perfect classes the Spearman of TDBM ranks is only {low}–{high}."
+
+
+def stop_probability_figure(decisions: YellowDecisions) -> Figure:
+    """Share of drivers that decided to stop, by time to the stop line at the onset of yellow and commanded style."""
+    k, m = NEUTRAL_YELLOW
+    edges = np.arange(0.0, 8.0 + YELLOW_BIN_S, YELLOW_BIN_S)
+    style = np.array(decisions.style, dtype=object)
+    with drawing():
+        figure, (axes,) = new_figure(WIDTH, 3.6)
+        fine = np.linspace(0, 8, 200)
+        neutral = f"neutral driver of the literature (k = {k} 1/s, m = {m} s)"
+        axes.plot(fine, expit(k * (fine - m)), color=UNJUDGED_COLOUR, ls="--", lw=1.4, label=neutral)
+        for name in [c for c in (*STYLE_CLASSES, "neutral") if (style == c).any()]:
+            tts, stopped = decisions.tts_s[style == name], decisions.stopped[style == name]
+            where = np.digitize(tts, edges) - 1
+            bins = [b for b in range(len(edges) - 1) if (where == b).sum() >= MIN_BIN]
+            middle = [tts[where == b].mean() for b in bins]
+            share = [stopped[where == b].mean() for b in bins]
+            label = f"{name}, n = {len(tts)}"
+            axes.plot(middle, share, style_marker(name) + "-", color=style_colour(name), ms=5.5, lw=1.3, label=label)
+        axes.set_xlim(0, 8)
+        axes.set_ylim(-0.03, 1.03)
+        axes.set_xlabel("time to the stop line at the onset of yellow (s)")
+        axes.set_ylabel("share that decides to stop")
+        axes.set_title(f"Stop or go at the yellow by commanded style ({YELLOW_BIN_S:g} s bins of {MIN_BIN} or more)")
+        axes.legend(loc="upper left", bbox_to_anchor=(1.0, 1.0))
+    return figure
