@@ -25,7 +25,7 @@ MAX_OFF_CLOCK_SHARE = 0.01
 STAMP_SLACK_US = 2_000_000  # the name gives whole seconds; tracks may overlap it a little
 # Chosen: below this the classifier of the source does not say what it is; 1 of 211 tracks in the shipped file.
 MIN_CLASS_PROBABILITY = 0.4
-STANDING_MPS = 1.0  # chosen: a vehicle first seen slower than this did not drive into view
+STANDING_MPS = 1.0  # chosen: a vehicle last seen slower than this did not drive out of view: its id was lost
 
 _NUMBERS = (
     "center_easting", "center_northing", "velocity_easting", "velocity_northing", "yaw",
@@ -106,8 +106,9 @@ def _recording(
     velocity = table.select("velocity_easting", "velocity_northing").to_numpy()
     kind = _kinds(table.select(*_CLASSES).to_numpy()[first])
     size = table.select("dimension_length", "dimension_width").to_numpy()[first]
-    slow = np.hypot(*velocity[first].T) < STANDING_MPS
-    begun_late = frame[first] > 1_000_000 // STEP_US
+    last = np.append(first[1:], len(agent)) - 1
+    slow = np.hypot(*velocity[last].T) < STANDING_MPS
+    ended_early = frame[last] < frame.max() - 1_000_000 // STEP_US
     return Recording(
         recording_id="dlr_ut_" + (stamp.text if stamp else tracks.name.split(".")[0]),
         agent_id=tuple(str(i) for i in ids),
@@ -125,7 +126,7 @@ def _recording(
         notes={
             "tracks": len(ids),
             "rows_interpolated": int(table["interpolated"].sum()),
-            "tracks_begun_standing": int((np.isin(kind, [int(k) for k in MOTOR_KINDS]) & slow & begun_late).sum()),
+            "tracks_ended_standing": int((np.isin(kind, [int(k) for k in MOTOR_KINDS]) & slow & ended_early).sum()),
         },
     )
 

@@ -23,6 +23,7 @@ from stylesim.datasets.resampling import decimated
 from stylesim.datasets.site_roads import SiteRoad, load_site_road, site_road_at
 from stylesim.datasets.stamps import Stamp
 from stylesim.errors import InputError
+from stylesim.road import Road
 from stylesim.scene import Scene
 
 SOURCE = "dlr_ut"
@@ -47,27 +48,30 @@ def scenes(path: str | Path, *, scene_s: float = SCENE_S, road: str = "site") ->
         if stamp is None or previous is None or not stamp.continues(previous, within_s=JOINED_WITHIN_S):
             unit_id, unit_begin = raw.recording_id, begin
         previous = stamp
-        site, origin = _site(road, chosen, raw)
+        name, lanes, origin = _site(road, chosen, raw)
         yield from cut(
             decimated(raw),
             source=SOURCE,
-            scenario=site.name if site else "unknown_site",
+            scenario=name,
             unit_id=unit_id,
             origin_m=origin,
-            road=site.road if site else None,
+            road=lanes,
             scene_s=scene_s,
             unit_start_s=(begin - unit_begin) / 1e6,
         )
 
 
-def _site(road: str, chosen: SiteRoad | None, raw: Recording) -> tuple[SiteRoad | None, Float64[np.ndarray, " 2"]]:
-    """The road to use and the origin of the scenes; both follow from where the recording begins, not from its end."""
+def _site(road: str, chosen: SiteRoad | None, raw: Recording) -> tuple[str, Road | None, Float64[np.ndarray, " 2"]]:
+    """Name and road of the site and the origin of the scenes; all follow from where the recording begins."""
     begins_at = raw.position_m[np.argmin(raw.frame)]
+    origin = np.round(begins_at, -2)
+    known = chosen or site_road_at(SOURCE, begins_at)
+    name = known.name if known else "unknown_site"
     if road == "infer":
-        origin = np.round(begins_at, -2)
-        return SiteRoad("inferred_site", infer_road(raw, origin), origin, {}), origin
-    site = chosen or (site_road_at(SOURCE, begins_at) if road == "site" else None)
-    return site, (np.round(begins_at, -2) if site is None else site.origin_m)
+        return name, infer_road(raw, origin), origin
+    if road == "none" or known is None:
+        return name, None, origin
+    return name, known.road, known.origin_m
 
 
 def _track_files(path: Path) -> list[Path]:

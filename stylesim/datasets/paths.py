@@ -75,7 +75,7 @@ class Sight:
 
 
 def sight(line_m: Float64[np.ndarray, "station 2"], other_m: Float64[np.ndarray, "point 2"]) -> Sight:
-    """For each station of a line: how far to its left the other line passes, how it is turned, where along it that is."""
+    """For each station of a line: how far to its left the other line passes, at what angle, and where."""
     along, offset, distance, segment = project(line_m, other_m)
     turned = np.abs(wrap_angle(directions(other_m)[segment] - directions(line_m)))
     inside = distance <= np.abs(offset) + END_TOLERANCE_M
