@@ -1,0 +1,90 @@
+"""The file form of a trained forecaster: plain tensors and JSON, read with nothing that could run code."""
+
+from __future__ import annotations
+
+import io
+import json
+import pickle
+import zipfile
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import torch
+from torch import Tensor
+
+from stylesim.errors import InputError
+from stylesim.forecasting.conditioner import StyleConditioner
+from stylesim.forecasting.conditioning import StyleCells
+from stylesim.forecasting.config import ModelConfig
+from stylesim.forecasting.forecaster import TrainedForecaster
+from stylesim.forecasting.model import ForecastNetwork
+
+MODEL_FILE = "model.pt"
+FORMAT, VERSION = "stylesim-forecaster", 1
+
+
+def write_tensors(path: Path, content: Mapping[str, Any]) -> None:
+    """A file of tensors, numbers and strings that appears under its name only when whole."""
+    buffer = io.BytesIO()
+    torch.save(dict(content), buffer)
+    partial = path.with_name(path.name + ".partial")
+    partial.write_bytes(buffer.getbuffer())
+    partial.replace(path)
+
+
+def read_tensors(path: Path, *, format_name: str, version: int) -> dict[str, Any]:
+    """The content of such a file; InputError if it is missing, damaged, not ours, or newer."""
+    refused = f"{path} is not a checkpoint of stylesim"
+    try:
+        content = torch.load(path, map_location="cpu", weights_only=True)
+    except FileNotFoundError:
+        raise InputError(f"no such file: {path}; train a model with `stylesim train`") from None
+    except (pickle.UnpicklingError, RuntimeError, EOFError, zipfile.BadZipFile, ValueError, KeyError) as error:
+        raise InputError(f"{refused}, or it is damaged: {str(error).splitlines()[0][:200]}") from None
+    if not isinstance(content, dict) or content.get("format") != format_name:
+        raise InputError(f"{refused}: it has no {format_name!r} mark")
+    found = content.get("version")
+    if not isinstance(found, int) or found > version:
+        raise InputError(f"{path} has version {found}; this stylesim reads up to {version}: install a newer one")
+    return content
+
+
+def save(forecaster: TrainedForecaster, path: Path) -> None:
+    """Write a forecaster to a file."""
+    state: dict[str, Tensor] = {key: value.cpu() for key, value in forecaster.network.state_dict().items()}
+    conditioner = None if forecaster.conditioner is None else forecaster.conditioner.to_dict()
+    content = {
+        "format": FORMAT,
+        "version": VERSION,
+        "name": forecaster.name,
+        "config": json.dumps(forecaster.config.to_dict()),
+        "conditioner": json.dumps(conditioner),
+        "state": state,
+    }
+    write_tensors(path, content)
+
+
+def load(path: str | Path) -> TrainedForecaster:
+    """The forecaster in a folder that `train` made, or in its model.pt; InputError if it is none of ours."""
+    file = Path(path)
+    file = file / MODEL_FILE if file.is_dir() else file
+    content = read_tensors(file, format_name=FORMAT, version=VERSION)
+    try:
+        config = ModelConfig.from_dict(json.loads(content["config"]))
+        conditioner = conditioner_from_dict(json.loads(content["conditioner"]))
+        network = ForecastNetwork(config)
+        network.load_state_dict(content["state"])
+        return TrainedForecaster(str(content["name"]), network, conditioner)
+    except (KeyError, TypeError, ValueError, RuntimeError) as error:
+        raise InputError(f"{file} is a damaged checkpoint: {str(error).splitlines()[0][:200]}") from error
+
+
+def conditioner_from_dict(raw: Mapping[str, Any] | None) -> StyleConditioner | None:
+    """The inverse of `StyleConditioner.to_dict`; None for None."""
+    if raw is None:
+        return None
+    from stylesim.forecasting.judging import LabelerJudges
+
+    judges = LabelerJudges.from_dict(raw["judges"])
+    return StyleConditioner(raw["condition"], judges, StyleCells.from_dict(raw["cells"]))

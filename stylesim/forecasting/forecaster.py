@@ -1,0 +1,112 @@
+"""`TrainedForecaster`: a trained network that answers `ForecastTask`s."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+import torch
+from jaxtyping import Float32, Int64
+
+from stylesim.errors import InputError
+from stylesim.forecast import Forecast, ForecastTask
+from stylesim.forecasting.batching import gather, to_scene
+from stylesim.forecasting.conditioner import StyleConditioner
+from stylesim.forecasting.config import ModelConfig
+from stylesim.forecasting.model import ForecastNetwork
+from stylesim.forecasting.objective import selected_modes
+from stylesim.forecasting.samples import RoadCutter, add_window
+from stylesim.forecasting.store import MemorySink, SampleStore, StoreBuilder
+from stylesim.forecasting.tensors import TensorBatch
+
+BATCH_DRIVERS = 64  # drivers per forward pass; chosen: more did not make it faster on two cores
+NO_STYLE = "none"  # as `style` of predict: the null token for everyone
+DT_TOLERANCE_S = 1e-6
+
+
+class TrainedForecaster:
+    """Forecasts by a network; `conditioner` is None where it was trained without style."""
+
+    def __init__(self, name: str, network: ForecastNetwork, conditioner: StyleConditioner | None) -> None:
+        if (conditioner is None) != (network.config.styles == 0):
+            raise ValueError("a network with a style embedding needs a conditioner, and only such a one")
+        self.name = name
+        self.network = network.eval()
+        self.conditioner = conditioner
+        self._cutter = RoadCutter(network.config.inputs)
+
+    @property
+    def config(self) -> ModelConfig:
+        """The configuration of the network."""
+        return self.network.config
+
+    @property
+    def styles(self) -> tuple[str, ...]:
+        """The styles that `predict(style=...)` knows; () for a model without style."""
+        return () if self.conditioner is None else self.conditioner.cells.classes
+
+    def predict(self, tasks: Sequence[ForecastTask], style: str | None = None) -> list[Forecast]:
+        """Modes for every task, in the frame of its scene.
+
+        The style comes from each driver's history. `style` overrides it: the name of a class asks what everyone
+        would do if he were of that class, "none" asks without any style. InputError for tasks of another time
+        step, a longer future than the model was trained for, or an agent that is not known at t0.
+        """
+        if style not in (None, NO_STYLE) and self.conditioner is None:
+            raise InputError(f"{self.name} was trained without style; it cannot answer style={style!r}")
+        for task in tasks:
+            self._check(task)
+        if not tasks:
+            return []
+        sink = MemorySink(self.config.inputs)
+        builder = StoreBuilder(sink)
+        rows = [add_window(builder, self._cutter, t.scene, t.agent_index, self.config.inputs) for t in tasks]
+        sink.append("sample", np.concatenate(rows))
+        cond = np.concatenate([self._style_cond(task, style) for task in tasks])
+        path, probability = self._modes(sink.store(), cond)
+        result, start = [], 0
+        for task in tasks:
+            stop = start + len(task.agent_index)
+            result.append(Forecast(path[start:stop, :, : task.future_steps], probability[start:stop]))
+            start = stop
+        return result
+
+    def _check(self, task: ForecastTask) -> None:
+        inputs, tracks = self.config.inputs, task.scene.tracks
+        where = f"scene {task.scene.scene_id!r}"
+        if abs(tracks.dt_s - inputs.dt_s) > DT_TOLERANCE_S:
+            raise InputError(f"{where}: steps of {tracks.dt_s} s, but {self.name} was trained on {inputs.dt_s} s")
+        if task.future_steps > inputs.future_steps:
+            raise InputError(
+                f"{where}: {task.future_steps} future steps asked, but {self.name} was trained for "
+                f"{inputs.future_steps}; train with a longer future_s"
+            )
+        for index in task.agent_index:
+            if not tracks.valid[index, -1]:
+                raise InputError(
+                    f"{where}: agent {tracks.agent_id[index]!r} is not known at t0 (frame {task.t0_frame}); "
+                    "choose the agents with windows.target_agents"
+                )
+
+    def _style_cond(self, task: ForecastTask, style: str | None) -> Int64[np.ndarray, "driver 3"]:
+        if self.conditioner is None or style == NO_STYLE:
+            return np.full((len(task.agent_index), 3), -1, np.int64)
+        return self.conditioner.style_cond(task.scene, task.agent_index, style=style)
+
+    def _modes(
+        self, store: SampleStore, cond: Int64[np.ndarray, "sample 3"]
+    ) -> tuple[Float32[np.ndarray, "sample mode time 2"], Float32[np.ndarray, "sample mode"]]:
+        config = self.config
+        device = next(self.network.parameters()).device
+        paths = [np.zeros((0, config.modes, config.inputs.future_steps, 2), np.float32)]
+        chances = [np.zeros((0, config.modes), np.float32)]
+        self.network.eval()
+        with torch.inference_mode():
+            for index in np.split(np.arange(len(store)), range(BATCH_DRIVERS, len(store), BATCH_DRIVERS)):
+                batch = gather(store, index, config.inputs)
+                style = torch.from_numpy(cond[index]).to(device)
+                last = self.network(TensorBatch.of(batch, device), style)[-1]
+                path, chance = selected_modes(last.mean_m, last.logit, count=config.modes, apart_m=config.nms_m)
+                paths.append(to_scene(path.cpu().numpy(), batch.pose))
+                chances.append(chance.cpu().numpy())
+        return np.concatenate(paths), np.concatenate(chances)

@@ -1,0 +1,175 @@
+"""The network: agents and lanes become tokens, queries with an intention each become modes of the future.
+
+In the spirit of MTR (intention queries, iterated decoder, Gaussian-mixture head) [recalled], small enough for two
+cores.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import torch
+from jaxtyping import Float, Int
+from torch import Tensor, nn
+
+from stylesim.forecasting.batching import AGENT_ATTRIBUTES, AGENT_FEATURES, PIECE_ATTRIBUTES
+from stylesim.forecasting.config import ModelConfig
+from stylesim.forecasting.intentions import SPEED_EDGES_MPS
+from stylesim.forecasting.layers import DecoderLayer, EncoderLayer, PatchEncoder, Perceptron, scale
+from stylesim.forecasting.style_embedding import StyleContextEmbedding
+from stylesim.forecasting.tensors import TensorBatch
+
+METRE, MPS, SECOND = 0.05, 0.1, 0.2  # features of 20 m, 10 m/s, 5 s become 1
+RESIDUAL_M = 10.0  # an output of 1 moves the end of the path by this much
+SD_START_M, SD_GROWTH_MPS = 0.3, 0.5  # sd that an output of 0 stands for: at t = 0, and its growth
+LOG_SD_RANGE = (-3.0, 5.0)  # 5 cm .. 148 m; MTR clips likewise to keep the likelihood finite [recalled]
+
+
+@dataclass(frozen=True, eq=False)
+class Modes:
+    """A mixture over paths in the target's frame; `intention_m` is where each query was asked to end."""
+
+    mean_m: Float[Tensor, "batch query time 2"]
+    log_sd: Float[Tensor, "batch query time 2"]
+    logit: Float[Tensor, "batch query"]
+
+
+class Head(nn.Module):
+    """From a query to a path, its spread and its log-odds."""
+
+    def __init__(self, config: ModelConfig) -> None:
+        super().__init__()
+        self.steps = config.inputs.future_steps
+        self.path = Perceptron(config.width, 4 * config.width, 4 * self.steps)
+        self.odds = Perceptron(config.width, config.width, 1)
+        time = torch.arange(1, self.steps + 1, dtype=torch.float32) * config.inputs.dt_s
+        self.register_buffer("reach", (RESIDUAL_M * time / time[-1])[:, None], persistent=False)
+        self.register_buffer("log_sd0", (SD_START_M + SD_GROWTH_MPS * time).log()[:, None], persistent=False)
+        self.reach: Tensor
+        self.log_sd0: Tensor
+
+    def forward(self, query: Float[Tensor, "batch query width"], anchor: Float[Tensor, "batch query time 2"]) -> Modes:
+        """The mixture; a path is its anchor plus what the network adds, which grows with time from 0."""
+        out = self.path(query).unflatten(-1, (self.steps, 4))  # [batch query time 4]
+        mean = anchor + self.reach * out[..., :2]
+        log_sd = (self.log_sd0 + out[..., 2:]).clamp(*LOG_SD_RANGE)
+        return Modes(mean, log_sd, self.odds(query).squeeze(-1))
+
+
+class SceneEncoder(nn.Module):
+    """Agents and lane pieces as tokens that know of each other; the target is token 0."""
+
+    def __init__(self, config: ModelConfig) -> None:
+        super().__init__()
+        width, inputs = config.width, config.inputs
+        self.history = PatchEncoder(
+            steps=inputs.history_steps, features=AGENT_FEATURES, patch=config.patch_steps, width=width
+        )
+        self.agent = nn.Linear(AGENT_ATTRIBUTES, width)
+        self.piece = Perceptron(2 * inputs.points + PIECE_ATTRIBUTES, 2 * width, width)
+        self.layers = nn.ModuleList(
+            EncoderLayer(width, config.heads, config.dropout) for _ in range(config.encoder_layers)
+        )
+        self.norm = nn.LayerNorm(width)
+        agent_scale = scale([METRE, METRE, MPS, MPS, 1.0, 1.0, 1.0])
+        # width, limit, known, junction, inferred, stop known, stop x y, one-hot signal, its age
+        piece_scale = scale([0.2, METRE, 1.0, 1.0, 1.0, 1.0, METRE, METRE, 1.0, 1.0, 1.0, 1.0, 1.0, SECOND])
+        self.register_buffer("agent_scale", agent_scale, persistent=False)
+        self.register_buffer("piece_scale", piece_scale, persistent=False)
+        self.agent_scale: Tensor
+        self.piece_scale: Tensor
+
+    def tokens(self, batch: TensorBatch) -> Float[Tensor, "batch token width"]:
+        """One token per agent, then one per lane piece."""
+        agent = self.history(batch.agent * self.agent_scale) + self.agent(batch.agent_attribute)  # [batch agent width]
+        points = METRE * batch.piece.flatten(2)  # [batch piece 2*point]
+        piece = self.piece(torch.cat([points, batch.piece_attribute * self.piece_scale], dim=-1))
+        return torch.cat([agent, piece], dim=1)
+
+    def forward(
+        self, batch: TensorBatch, early: Float[Tensor, "batch width"] | None
+    ) -> Float[Tensor, "batch token width"]:
+        """The encoded scene; `early` is added to the target's token before self-attention."""
+        token = self.tokens(batch)
+        if early is not None:
+            token = added_to_target(token, early)
+        for layer in self.layers:
+            token = layer(token, batch.token_valid)
+        out: Tensor = self.norm(token)
+        return out
+
+
+def added_to_target(
+    token: Float[Tensor, "batch token width"], style: Float[Tensor, "batch width"]
+) -> Float[Tensor, "batch token width"]:
+    """The tokens with `style` added to token 0."""
+    return torch.cat([token[:, :1] + style[:, None], token[:, 1:]], dim=1)
+
+
+class ForecastNetwork(nn.Module):
+    """Encoder, intention queries, decoder. `intention_mps2` holds the queries' mean accelerations by speed group."""
+
+    def __init__(self, config: ModelConfig) -> None:
+        super().__init__()
+        self.config = config
+        width, inputs = config.width, config.inputs
+        self.encoder = SceneEncoder(config)
+        self.intention = Perceptron(4, width, width)
+        self.revision = Perceptron(2, width, width)
+        self.layers = nn.ModuleList(
+            DecoderLayer(width, config.heads, config.dropout) for _ in range(config.decoder_layers)
+        )
+        self.heads = nn.ModuleList(Head(config) for _ in range(config.decoder_layers))
+        self.style = self._style_embedding(config)
+        self.register_buffer("intention_mps2", torch.zeros(len(SPEED_EDGES_MPS) + 1, config.queries, 2))
+        self.register_buffer("speed_edges", torch.tensor(SPEED_EDGES_MPS), persistent=False)
+        time = torch.arange(1, inputs.future_steps + 1, dtype=torch.float32) * inputs.dt_s
+        self.register_buffer("time_s", time[:, None], persistent=False)
+        self.intention_mps2: Tensor
+        self.speed_edges: Tensor
+        self.time_s: Tensor
+
+    @staticmethod
+    def _style_embedding(config: ModelConfig) -> StyleContextEmbedding | None:
+        if not config.styles:
+            return None
+        return StyleContextEmbedding(
+            styles=config.styles,
+            width=config.width,
+            clusters=config.clusters,
+            contexts=config.contexts,
+            reading=config.reading,
+            rank=config.rank,
+            dropout=config.style_dropout,
+        )
+
+    def anchors(self, batch: TensorBatch) -> Float[Tensor, "batch query time 2"]:
+        """The path of each intention: the velocity of t0 and a constant acceleration, one set per speed group."""
+        velocity = batch.agent[:, 0, -1, 2:4]  # [batch 2]
+        group = torch.bucketize(velocity.norm(dim=-1), self.speed_edges, right=True)
+        acceleration = self.intention_mps2[group][:, :, None]  # [batch query 1 2]
+        return velocity[:, None, None] * self.time_s + 0.5 * acceleration * self.time_s**2
+
+    def forward(self, batch: TensorBatch, style: Int[Tensor, "batch 3"] | None = None) -> list[Modes]:
+        """The mixture after every decoder layer, the last one best. `style` rows are (z, k, c), z < 0 unknown."""
+        embedding = None
+        if self.style is not None:
+            unknown = torch.full((len(batch.agent), 3), -1, device=batch.agent.device)
+            embedding = self.style(unknown if style is None else style)  # [batch width]
+        fusion = self.config.fusion if embedding is not None else "none"
+        scene = self.encoder(batch, embedding if fusion == "early" else None)  # [batch token width]
+        if fusion == "mid" and embedding is not None:
+            scene = added_to_target(scene, embedding)
+        anchor = self.anchors(batch)
+        velocity = MPS * batch.agent[:, 0, -1, 2:4]
+        intention = torch.cat([METRE * anchor[:, :, -1], velocity[:, None].expand(-1, anchor.shape[1], -1)], dim=-1)
+        query = scene[:, :1] + self.intention(intention)  # [batch query width]
+        modes: list[Modes] = []
+        for layer, head in zip(self.layers, self.heads, strict=True):
+            if modes:  # say where the previous layer saw it end
+                query = query + self.revision(METRE * modes[-1].mean_m[:, :, -1].detach())
+            if fusion == "late" and embedding is not None:
+                query = query + embedding[:, None]
+            query = layer(query, scene, batch.token_valid)
+            modes.append(head(query, anchor))
+        return modes
