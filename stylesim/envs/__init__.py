@@ -1,1 +1,1 @@
-
+"""Gymnasium environments: an ego among drivers of every style."""
