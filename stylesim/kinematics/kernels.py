@@ -1,0 +1,156 @@
+"""The hot loops, compiled by numba at their first call and cached; imported only by functions that run them.
+
+Each loop runs over frames or agents in a fixed order on one core, so the same input gives the same bits.
+"""
+
+from __future__ import annotations
+
+from typing import no_type_check
+
+import numpy as np
+from numba import njit
+
+
+@njit(cache=True, nogil=True)
+@no_type_check
+def local_polynomial(values, run, operators, least, out):
+    """Fit a polynomial around every sample of every run and write its value and derivatives.
+
+    values [agent time channel], run [agent time] (an unbroken run shares a number, -1: nothing there),
+    operators [run length - least, place in the window, derivative, sample], out [agent time channel derivative].
+    """
+    agents, frames = run.shape
+    taps = operators.shape[1]
+    for agent in range(agents):
+        start = 0
+        while start < frames:
+            if run[agent, start] < 0:
+                start += 1
+                continue
+            stop = start + 1
+            while stop < frames and run[agent, stop] == run[agent, start]:
+                stop += 1
+            if stop - start >= least:
+                width = min(stop - start, taps)
+                for frame in range(start, stop):
+                    first = max(start, min(frame - width // 2, stop - width))
+                    operator = operators[width - least, frame - first]
+                    for channel in range(values.shape[2]):
+                        # Relative to the sample itself, so that a far origin costs no digits.
+                        base = np.float64(values[agent, frame, channel])
+                        for order in range(operator.shape[0]):
+                            total = 0.0
+                            for i in range(width):
+                                total += operator[order, i] * (values[agent, first + i, channel] - base)
+                            out[agent, frame, channel, order] = total
+                        out[agent, frame, channel, 0] += base
+            start = stop
+
+
+@njit(cache=True, nogil=True)
+@no_type_check
+def ordered_frame(point, present, frame, index, key):
+    """Sort the agents present in a frame along the axis on which they spread more; how many, and which axis."""
+    count = 0
+    low_x = low_y = np.inf
+    high_x = high_y = -np.inf
+    for agent in range(present.shape[0]):
+        if present[agent, frame]:
+            x, y = point[agent, frame, 0], point[agent, frame, 1]
+            low_x, high_x = min(low_x, x), max(high_x, x)
+            low_y, high_y = min(low_y, y), max(high_y, y)
+            index[count] = agent
+            count += 1
+    axis = 0 if high_x - low_x >= high_y - low_y else 1
+    for i in range(count):
+        key[i] = point[index[i], frame, axis]
+    order = np.argsort(key[:count])
+    index[:count] = index[:count][order]
+    key[:count] = key[:count][order]
+    return count
+
+
+@njit(cache=True, nogil=True)
+@no_type_check
+def closing_sums(point, direction, speed, is_ego, is_neighbour, radius, least_cosine, floor, closing, count):
+    """Sum max(0, (v - v_n) / distance) over each ego's neighbours, frame by frame; also how many there are.
+
+    point, direction [agent time 2], speed, is_ego, is_neighbour, closing, count [agent time].
+    """
+    agents, frames = speed.shape
+    index = np.empty(agents, np.int64)
+    key = np.empty(agents)
+    present = is_ego | is_neighbour
+    for frame in range(frames):
+        n = ordered_frame(point, present, frame, index, key)
+        for i in range(n):
+            a = index[i]
+            ax, ay = point[a, frame, 0], point[a, frame, 1]
+            for j in range(i + 1, n):
+                if key[j] - key[i] > radius:
+                    break
+                b = index[j]
+                dx, dy = point[b, frame, 0] - ax, point[b, frame, 1] - ay
+                squared = dx * dx + dy * dy
+                if squared > radius * radius:
+                    continue
+                cosine = (
+                    direction[a, frame, 0] * direction[b, frame, 0] + direction[a, frame, 1] * direction[b, frame, 1]
+                )
+                if cosine < least_cosine:
+                    continue
+                closeness = 1.0 / max(np.sqrt(squared), floor)
+                difference = (speed[a, frame] - speed[b, frame]) * closeness
+                if is_ego[a, frame] and is_neighbour[b, frame]:
+                    closing[a, frame] += max(0.0, difference)
+                    count[a, frame] += 1
+                if is_ego[b, frame] and is_neighbour[a, frame]:
+                    closing[b, frame] += max(0.0, -difference)
+                    count[b, frame] += 1
+
+
+@njit(cache=True, nogil=True)
+@no_type_check
+def corridor_scan(point, direction, size, is_ego, is_other, reach, least_cosine, leader, gap):
+    """The nearest vehicle whose footprint an ego would meet if it drove straight on; leader -1 where none.
+
+    point, direction [agent time 2], size [agent 2], is_ego, is_other, leader, gap [agent time].
+    """
+    agents, frames = leader.shape
+    index = np.empty(agents, np.int64)
+    key = np.empty(agents)
+    present = is_ego | is_other
+    longest = 0.0
+    for agent in range(agents):
+        if size[agent, 0] > longest:
+            longest = size[agent, 0]
+    for frame in range(frames):
+        n = ordered_frame(point, present, frame, index, key)
+        for i in range(n):
+            a = index[i]
+            for j in range(i + 1, n):
+                if key[j] - key[i] > reach + longest:
+                    break
+                b = index[j]
+                dx = point[b, frame, 0] - point[a, frame, 0]
+                dy = point[b, frame, 1] - point[a, frame, 1]
+                cosine = (
+                    direction[a, frame, 0] * direction[b, frame, 0] + direction[a, frame, 1] * direction[b, frame, 1]
+                )
+                if cosine < least_cosine:
+                    continue
+                half_width = 0.5 * (size[a, 1] + size[b, 1])
+                half_length = 0.5 * (size[a, 0] + size[b, 0])
+                for side in range(2):
+                    ego, other, sign = (a, b, 1.0) if side == 0 else (b, a, -1.0)
+                    if not (is_ego[ego, frame] and is_other[other, frame]):
+                        continue
+                    hx, hy = direction[ego, frame, 0], direction[ego, frame, 1]
+                    along = sign * (dx * hx + dy * hy)
+                    across = sign * (dy * hx - dx * hy)
+                    if along <= 0.0 or abs(across) >= half_width:
+                        continue
+                    distance = max(0.0, along - half_length)
+                    if distance <= reach and (leader[ego, frame] < 0 or distance < gap[ego, frame]):
+                        leader[ego, frame] = other
+                        gap[ego, frame] = distance

@@ -1,0 +1,181 @@
+"""The features of driving style of every agent of a scene, for TDBM and KDSC alike."""
+
+from __future__ import annotations
+
+from collections import OrderedDict
+from dataclasses import dataclass
+
+import numpy as np
+from jaxtyping import Bool, Float64, Int32
+
+from stylesim.kinematics import Motion, closing_on_neighbours, displaced, motion
+from stylesim.labelers import cuts, lanes
+from stylesim.labelers.context import highway_share
+from stylesim.labelers.cuts import Cut
+from stylesim.labelers.lanes import LaneMatch
+from stylesim.labelers.options import FeatureOptions
+from stylesim.labelers.reduce import Groups
+from stylesim.labelers.roadindex import RoadIndex, build
+from stylesim.labels import LabelFlag
+from stylesim.road import Road
+from stylesim.scene import Scene
+from stylesim.tracks import Tracks
+
+TDBM_FEATURES = ("s_center", "v_nei", "s_front", "v_avg", "j_l")
+KDSC_FEATURES = (
+    "mean_speed", "max_speed", "var_speed", "mean_acceleration", "max_abs_acceleration", "var_acceleration",
+    "mean_jerk", "var_jerk", "std_jerk",
+)  # fmt: skip
+FEATURES = TDBM_FEATURES + KDSC_FEATURES
+
+# A feature that needs a lane is missing where less than half of the window's frames have one [ours].
+LEAST_LANE_SHARE = 0.5
+# Beyond what tyres hold (about 1 g) with a margin: the position, not the driver, did that. Chosen.
+IMPLAUSIBLE_MPS2 = 12.0
+
+
+@dataclass(frozen=True, eq=False)
+class WindowFeatures:
+    """Features per agent and window, in SI units, NaN where missing; `frames` is 0 where there is no window.
+
+    `s_front` without any leader is the leader range, with the flag NO_LEADER. `highway` is the share of the window's
+    frames on a highway.
+    """
+
+    value: Float64[np.ndarray, "agent window feature"]
+    frames: Int32[np.ndarray, "agent window"]
+    highway: Float64[np.ndarray, "agent window"]
+    flags: Int32[np.ndarray, "agent window"]
+    length_steps: int
+
+    @property
+    def full(self) -> Bool[np.ndarray, "agent window"]:
+        """Windows that hold (nearly) all of their frames."""
+        return self.frames >= cuts.FULL_SHARE * self.length_steps
+
+    def column(self, name: str) -> Float64[np.ndarray, "agent window"]:
+        """One feature."""
+        return self.value[..., FEATURES.index(name)]
+
+
+def window_features(scene: Scene, start: int, length_steps: int, options: FeatureOptions) -> WindowFeatures:
+    """Features of the one window [start, start + length_steps): cut first, then smoothed; other frames play no part.
+
+    ValueError if the window is not within the scene.
+    """
+    tracks = scene.tracks.frames(start, start + length_steps)
+    return _features(tracks, scene.road, cuts.whole(tracks.valid), options)
+
+
+def tiled_features(scene: Scene, length_steps: int, options: FeatureOptions) -> WindowFeatures:
+    """Features of each agent's own windows of that length, side by side from its first frame to its last."""
+    return _features(scene.tracks, scene.road, cuts.tiles(scene.tracks.valid, length_steps), options)
+
+
+_INDICES: OrderedDict[tuple[int, float], RoadIndex] = OrderedDict()
+# Roads remembered with their index. Chosen: a few sites in turn; each may hold some MB.
+_INDICES_KEPT = 4
+
+
+def road_index(road: Road | None, range_m: float) -> RoadIndex | None:
+    """The index of a road, remembered for the roads used last; None where there is no lane."""
+    if road is None or not road.lanes:
+        return None
+    key = (id(road), range_m)  # the index holds the road, so its id cannot be reused while it is remembered
+    if key not in _INDICES:
+        _INDICES[key] = build(road, range_m=range_m)
+        while len(_INDICES) > _INDICES_KEPT:
+            _INDICES.popitem(last=False)
+    _INDICES.move_to_end(key)
+    return _INDICES[key]
+
+
+def _features(tracks: Tracks, road: Road | None, cut: Cut, options: FeatureOptions) -> WindowFeatures:
+    index = road_index(road, options.leader_range_m)
+    moved = motion(tracks.position_m, tracks.heading_rad, cut.run, dt_s=tracks.dt_s, smoother=options.smoother)
+    vehicle = tracks.valid & tracks.is_motor[:, None]
+    found = None if index is None else lanes.match(tracks, index, vehicle)
+    groups = Groups(cut)
+    flags = np.zeros(groups.shape, np.int32)
+    columns = _kinematic(moved, groups)
+    columns["s_center"] = _centre(tracks, found, cut, groups, flags, options)
+    columns["v_nei"] = _neighbours(tracks, moved, vehicle, cut, groups, flags, options)
+    follow = lanes.leaders(tracks, moved, found, index, is_vehicle=vehicle, options=options)
+    has_leader = groups.count(follow.leader >= 0) > 0
+    columns["s_front"] = np.where(has_leader, groups.of(follow.gap_m).mean(), options.leader_range_m)
+    frames = groups.count(tracks.valid).astype(np.int32)
+    columns["s_front"][frames == 0] = np.nan
+    flags[~has_leader & (frames > 0)] |= LabelFlag.NO_LEADER
+    flags[columns["max_abs_acceleration"] > IMPLAUSIBLE_MPS2] |= LabelFlag.IMPLAUSIBLE
+    result = WindowFeatures(
+        value=np.stack([columns[name] for name in FEATURES], axis=-1),
+        frames=frames,
+        highway=highway_share(moved, found, index, is_vehicle=vehicle, cut=cut),
+        flags=flags,
+        length_steps=cut.length_steps,
+    )
+    flags[~result.full & (frames > 0)] |= LabelFlag.SHORT
+    return result
+
+
+def _kinematic(moved: Motion, groups: Groups) -> dict[str, Float64[np.ndarray, "agent window"]]:
+    speed, acceleration = groups.of(moved.speed_mps), groups.of(moved.acceleration_mps2)
+    jerk = groups.of(moved.jerk_mps3)
+    var_jerk = jerk.variance()
+    return {
+        "v_avg": speed.mean(),
+        "j_l": groups.of(np.abs(moved.jerk_mps3)).mean(),
+        "mean_speed": speed.mean(),
+        "max_speed": speed.maximum(),
+        "var_speed": speed.variance(),
+        "mean_acceleration": acceleration.mean(),
+        "max_abs_acceleration": groups.of(np.abs(moved.acceleration_mps2)).maximum(),
+        "var_acceleration": acceleration.variance(),
+        "mean_jerk": jerk.mean(),
+        "var_jerk": var_jerk,
+        "std_jerk": np.sqrt(var_jerk),
+    }
+
+
+def _centre(
+    tracks: Tracks,
+    found: LaneMatch | None,
+    cut: Cut,
+    groups: Groups,
+    flags: Int32[np.ndarray, "agent window"],
+    options: FeatureOptions,
+) -> Float64[np.ndarray, "agent window"]:
+    """s_center, the mean of |d| (mu + |dd/dt|) over the frames whose lane is known."""
+    frames = groups.count(tracks.valid)
+    if found is None:
+        flags[frames > 0] |= LabelFlag.NO_LANE
+        return np.full(groups.shape, np.nan)
+    rate = groups.of(lanes.straying(found, cut.run, tracks.dt_s, options).rate)
+    missing = rate.count < LEAST_LANE_SHARE * frames
+    flags[missing] |= LabelFlag.NO_LANE
+    return np.where(missing, np.nan, rate.mean())
+
+
+def _neighbours(
+    tracks: Tracks,
+    moved: Motion,
+    vehicle: Bool[np.ndarray, "agent time"],
+    cut: Cut,
+    groups: Groups,
+    flags: Int32[np.ndarray, "agent window"],
+    options: FeatureOptions,
+) -> Float64[np.ndarray, "agent window"]:
+    """v_nei, the mean over the window of the closing speeds weighed by nearness; 0 and flagged without neighbours."""
+    everyone = options.neighbours == "all"
+    driving = tracks.valid if everyone else vehicle & displaced(tracks.position_m, cut.run, options.parked_within_m)
+    closing = closing_on_neighbours(
+        moved,
+        is_ego=vehicle,
+        is_neighbour=driving,
+        radius_m=options.radius_m,
+        heading_within_rad=float(np.pi if everyone else np.radians(options.neighbour_heading_deg)),
+        distance_floor_m=options.distance_floor_m,
+    )
+    alone = groups.count(closing.count > 0) == 0
+    flags[alone & (groups.count(tracks.valid) > 0)] |= LabelFlag.NO_NEIGHBOURS
+    return groups.of(np.where(moved.known, closing.rate_per_s, np.nan)).mean()
