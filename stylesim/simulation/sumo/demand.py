@@ -1,0 +1,99 @@
+"""Who enters an episode, when, and where to; and the route file that says so to SUMO."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+
+import numpy as np
+
+from stylesim.errors import SimulationError
+from stylesim.population import Population
+from stylesim.randomness import stream
+from stylesim.scenario import Scenario
+from stylesim.simulation.sumo.options import Flow, SumoOptions
+from stylesim.simulation.sumo.roads import RoadNetwork
+from stylesim.simulation.sumo.vehicles import Driver, draw_body, type_attributes
+
+SHORTEST_HEADWAY_S = 0.5  # between entries of one flow; chosen, because two lanes at 1 s each can be entered that fast
+ROUTES_HEAD = (
+    '<routes xmlns:xsi="http://www.w3.org/2001/XMLSchema-instance"'
+    ' xsi:noNamespaceSchemaLocation="http://sumo.dlr.de/xsd/routes_file.xsd">'
+)  # names the schema, because without it SUMO ignores a misspelt attribute
+
+
+@dataclass(frozen=True)
+class Arrivals:
+    """The key of an episode's random streams and its demand."""
+
+    seed: int
+    episode: int
+    until_s: float
+    parameters: Mapping[str, float]
+
+
+def _departures(flow: Flow, arrivals: Arrivals) -> Iterator[float]:
+    """Times in s, rounded to the step: Poisson arrivals with a shortest headway (shifted exponential)."""
+    mean = 3600.0 / (arrivals.parameters["demand_vph"] * flow.share)
+    shortest = min(SHORTEST_HEADWAY_S, 0.5 * mean)
+    rng = stream(arrivals.seed, arrivals.episode, flow.name, "departures")
+    time = float(rng.exponential(mean))
+    while time < arrivals.until_s:
+        yield round(time, 1)
+        time += shortest + float(rng.exponential(mean - shortest))
+
+
+def _driver(flow: Flow, number: int, depart_s: float, population: Population, arrivals: Arrivals) -> Driver:
+    """One driver; each of its draws has a stream of its own, so that another driver shifts none."""
+    name = f"{flow.name}.{number}"
+    ways = list(flow.to)
+    weight = np.array([flow.to[way] for way in ways])
+    seed, episode = arrivals.seed, arrivals.episode
+    way = ways[int(stream(seed, episode, name, "route").choice(len(ways), p=weight / weight.sum()))]
+    body = stream(seed, episode, name, "body")
+    truck = bool(body.random() < arrivals.parameters["truck_share"]) and flow.trucks
+    kind, length, width = draw_body(truck=truck, rng=body)
+    style = population.draw(stream(seed, episode, name, "style"))
+    return Driver(name, style, kind, length, width, depart_s, f"{flow.enter} {way}")
+
+
+def draw_drivers(
+    scenario: Scenario,
+    options: SumoOptions,
+    population: Population,
+    *,
+    seed: int,
+    episode: int,
+    parameters: Mapping[str, float],
+) -> tuple[Driver, ...]:
+    """Every driver of the episode by time of entry."""
+    arrivals = Arrivals(seed, episode, scenario.warm_up_s + scenario.duration_s, parameters)
+    drivers = [
+        _driver(flow, number, time, population, arrivals)
+        for flow in options.flows
+        for number, time in enumerate(_departures(flow, arrivals))
+    ]
+    return tuple(sorted(drivers, key=lambda driver: (driver.depart_s, driver.driver_id)))
+
+
+def check_routes(options: SumoOptions, network: RoadNetwork, *, name: str) -> None:
+    """SimulationError if a flow names an edge that the network does not have."""
+    for flow in options.flows:
+        for edge in [flow.enter, *(edge for way in flow.to for edge in way.split())]:
+            if edge not in network.edges:
+                raise SimulationError(
+                    f"scenario {name!r}: flow {flow.name!r} uses edge {edge!r}; known: {', '.join(network.edges)}"
+                )
+
+
+def routes_xml(drivers: tuple[Driver, ...]) -> str:
+    """The route file: a vehicle type and a vehicle for each driver."""
+    lines = [ROUTES_HEAD]
+    for driver in drivers:
+        attributes = " ".join(f'{key}="{value}"' for key, value in type_attributes(driver).items())
+        lines.append(f'<vType id="{driver.driver_id}" {attributes}/>')
+        lines.append(
+            f'<vehicle id="{driver.driver_id}" type="{driver.driver_id}" depart="{driver.depart_s:.1f}"'
+            f' departLane="best" departSpeed="max" departPos="base"><route edges="{driver.route}"/></vehicle>'
+        )
+    return "\n".join([*lines, "</routes>", ""])

@@ -1,0 +1,95 @@
+"""One episode as files that the bare `sumo` program can run too: network, routes, signal programme, options."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+
+from stylesim.population import Population
+from stylesim.randomness import stream
+from stylesim.scenario import Scenario
+from stylesim.simulation.driving import HARDEST_BRAKING_MPS2
+from stylesim.simulation.sumo.demand import check_routes, draw_drivers, routes_xml
+from stylesim.simulation.sumo.network import compiled_network
+from stylesim.simulation.sumo.options import SumoOptions, sumo_options_of
+from stylesim.simulation.sumo.roads import RoadNetwork, read_network
+from stylesim.simulation.sumo.signals import programme_of
+from stylesim.simulation.sumo.vehicles import Driver
+
+DT_S = 0.1
+
+
+@dataclass(frozen=True)
+class EpisodeFiles:
+    """Everything that decides how an episode runs, but for the drivers' answers to yellow lights."""
+
+    network_path: Path
+    route_path: Path
+    additional_path: Path | None  # the signal programme, where there is a signal
+    drivers: Mapping[str, Driver]
+    parameters: Mapping[str, float]
+    network: RoadNetwork
+    options: SumoOptions
+    seed: int
+    episode: int
+    warm_up_s: float
+    duration_s: float
+
+    @property
+    def end_s(self) -> float:
+        """When the episode ends on SUMO's clock."""
+        return self.warm_up_s + self.duration_s
+
+
+def prepare_episode(
+    scenario: Scenario, population: Population, *, seed: int, episode: int, folder: Path
+) -> EpisodeFiles:
+    """Draws an episode and writes its files into `folder` (which exists).
+
+    Raises InputError for options that do not fit, SimulationError where the network cannot be compiled.
+    """
+    options = sumo_options_of(scenario)
+    parameters = scenario.draw(stream(seed, episode, "", "scenario"))
+    path = compiled_network(scenario, options, speed_limit_mps=parameters["speed_limit_mps"])
+    network = read_network(path)
+    check_routes(options, network, name=scenario.name)
+    drivers = draw_drivers(scenario, options, population, seed=seed, episode=episode, parameters=parameters)
+    routes = folder / "routes.rou.xml"
+    routes.write_text(routes_xml(drivers), encoding="utf-8")
+    additional = None
+    if options.signal is not None:
+        share = float(stream(seed, episode, "", "signal offset").random())
+        additional = folder / "signal.add.xml"
+        programme = programme_of(options.signal, network, parameters, offset_share=share)
+        additional.write_text(programme.xml(), encoding="utf-8")
+    return EpisodeFiles(
+        network_path=path,
+        route_path=routes,
+        additional_path=additional,
+        drivers={driver.driver_id: driver for driver in drivers},
+        parameters=parameters,
+        network=network,
+        options=options,
+        seed=seed,
+        episode=episode,
+        warm_up_s=scenario.warm_up_s,
+        duration_s=scenario.duration_s,
+    )
+
+
+def sumo_options(files: EpisodeFiles) -> list[str]:
+    """The command line (without the program) of the episode, for libsumo and for the bare `sumo` alike.
+
+    Collisions are warned of and not removed, nobody is teleported. Lane changes take time: `maxSpeedLat` of each
+    type gives it, the option switches it on. A driver may brake at a yellow with up to 7.5 m/s2, because whether it
+    does is decided in `driving`.
+    """
+    seed = (files.seed * 1_000_003 + files.episode) % (2**31 - 1)
+    options = ["-n", str(files.network_path), "-r", str(files.route_path)]
+    if files.additional_path is not None:
+        options += ["-a", str(files.additional_path)]
+    options += ["--seed", str(seed), "--step-length", f"{DT_S}", "--begin", "0", "--end", f"{files.end_s:.1f}"]
+    options += ["--collision.action", "warn", "--collision.check-junctions", "--time-to-teleport", "-1"]
+    options += ["--lanechange.duration", "4.5", "--tls.yellow.min-decel", f"{HARDEST_BRAKING_MPS2}"]
+    return [*options, "--no-step-log", "--no-warnings", "--duration-log.disable", "--xml-validation", "never"]

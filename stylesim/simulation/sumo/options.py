@@ -1,0 +1,95 @@
+"""What a scenario of this backend says under `options`, checked strictly."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Literal
+
+from pydantic import Field, model_validator
+
+from stylesim.errors import InputError, unknown
+from stylesim.scenario import Scenario
+from stylesim.specs import Spec, parse
+
+PARAMETERS = ("speed_limit_mps", "demand_vph", "truck_share")
+SIGNAL_PARAMETERS = ("cycle_s", "first_green_share", "yellow_s", "all_red_s")
+
+
+class NetworkFiles(Spec):
+    """Plain XML beside scenario.yaml."""
+
+    nodes: str
+    edges: str
+    connections: str
+
+
+class EdgeType(Spec):
+    """A kind of road: its speed limit is the drawn one times `of_limit`, or fixed."""
+
+    of_limit: float | None = Field(default=None, gt=0, le=1.5)
+    limit_mps: float | None = Field(default=None, gt=0)
+
+    @model_validator(mode="after")
+    def _one_of(self) -> EdgeType:
+        if (self.of_limit is None) == (self.limit_mps is None):
+            raise ValueError("give either of_limit or limit_mps")
+        return self
+
+
+class Flow(Spec):
+    """Vehicles that enter by one edge: `share` of the demand, spread over the ways `to`."""
+
+    name: str = Field(pattern=r"^[a-z_]{1,8}$")
+    enter: str
+    share: float = Field(gt=0, le=1)
+    to: dict[str, float] = Field(min_length=1)  # the rest of the route, edges separated by spaces -> weight
+    trucks: bool = True
+
+
+class SignalPlan(Spec):
+    """A fixed-time signal: `groups` of entering edges get green one after the other."""
+
+    junction: str
+    groups: tuple[tuple[str, ...], ...] = Field(min_length=2, max_length=2)
+    left_turns: Literal["permissive", "protected"] = "permissive"
+
+
+class SumoOptions(Spec):
+    """The whole of `options`."""
+
+    network: NetworkFiles
+    edge_types: dict[str, EdgeType]
+    flows: tuple[Flow, ...] = Field(min_length=1)
+    signal: SignalPlan | None = None
+
+    @model_validator(mode="after")
+    def _shares(self) -> SumoOptions:
+        total = sum(flow.share for flow in self.flows)
+        if abs(total - 1.0) > 1e-6:
+            raise ValueError(f"the shares of the flows sum to {total:.6g}, not 1")
+        if len({flow.name for flow in self.flows}) != len(self.flows):
+            raise ValueError("two flows have the same name")
+        return self
+
+
+def sumo_options_of(scenario: Scenario) -> SumoOptions:
+    """The checked options of a scenario; InputError naming the field, or the parameter that is missing or unknown."""
+    where = scenario.folder / "scenario.yaml"
+    options = parse(SumoOptions, scenario.options, f"{where}: options")
+    wanted = PARAMETERS + (SIGNAL_PARAMETERS if options.signal else ())
+    for name in scenario.parameters:
+        if name not in wanted:
+            raise unknown("parameter", name, wanted, where=where)
+    for name in wanted:
+        if name not in scenario.parameters:
+            raise InputError(f"{where}: parameter {name!r} is missing; this scenario needs {', '.join(wanted)}")
+    return options
+
+
+def source_files(scenario: Scenario, options: SumoOptions) -> dict[str, Path]:
+    """The network's source files by kind; InputError if one is missing."""
+    files = {kind: scenario.folder / name for kind, name in options.network.model_dump().items()}
+    for kind, path in files.items():
+        if not path.is_file():
+            raise InputError(f"{scenario.folder / 'scenario.yaml'}: network.{kind}: no such file: {path}")
+    return files

@@ -1,0 +1,58 @@
+"""`SumoBackend`: episodes in SUMO, by libsumo in this process."""
+
+from __future__ import annotations
+
+import tempfile
+from pathlib import Path
+
+from stylesim.population import Population
+from stylesim.scenario import Scenario
+from stylesim.scene import Scene
+from stylesim.simulation.sumo.engine import Engine
+from stylesim.simulation.sumo.episode import DT_S, EpisodeFiles, prepare_episode, sumo_options
+from stylesim.simulation.sumo.recorder import RawLog, Recorder
+from stylesim.simulation.sumo.scenes import scene_of
+from stylesim.simulation.sumo.yellow import DecisionEvent, YellowController
+
+LEAD_S = 4.0  # recorded before the first logged frame, because bodies follow the path behind them
+
+
+class SumoBackend:
+    """The backend "sumo". libsumo is imported when it is made (MissingDependencyError where it cannot be).
+
+    One simulation per process: a second backend that loads while this one is open gets a SimulationError.
+    """
+
+    name = "sumo"
+
+    def __init__(self) -> None:
+        self._engine = Engine()
+
+    def run_episode(self, scenario: Scenario, population: Population, *, seed: int, episode: int) -> Scene:
+        """One episode as a scene: the frames after the warm-up, every 0.1 s.
+
+        A vehicle is logged from 3 s after its insertion (it finds its speed and lane until then; the dropped steps are
+        counted) until it arrives. Raises InputError, SimulationError.
+        """
+        with tempfile.TemporaryDirectory(prefix="stylesim-") as folder:
+            files = prepare_episode(scenario, population, seed=seed, episode=episode, folder=Path(folder))
+            log, decisions = self.simulate(files)
+        return scene_of(log, decisions, files, name=scenario.name)
+
+    def simulate(self, files: EpisodeFiles) -> tuple[RawLog, list[DecisionEvent]]:
+        """Steps through a prepared episode; what was logged and what was decided at yellow lights."""
+        engine = self._engine
+        engine.load(sumo_options(files))
+        plan = files.options.signal
+        first = max(0, round((files.warm_up_s - LEAD_S) / DT_S))
+        recorder = Recorder(engine.sumo, signal=plan.junction if plan else "", first_step=first)
+        controller = YellowController(engine.sumo, files)
+        for step in range(round(files.end_s / DT_S)):
+            controller.before_step(step)
+            engine.step()
+            recorder.after_step(step)
+        return recorder.finish(), controller.events
+
+    def close(self) -> None:
+        """Ends the simulation."""
+        self._engine.close()
