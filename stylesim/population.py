@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Literal
 
@@ -25,7 +25,7 @@ class PopulationSpec(Spec):
     about: str
     source: str = Field(min_length=3)
     shares: dict[str, float]
-    within_class: Literal["interval", "centre"] = "interval"
+    within_class: Literal["interval", "centre", "neutral"] = "interval"
 
 
 def check_shares(shares: Mapping[str, float], *, where: str) -> dict[str, float]:
@@ -43,7 +43,10 @@ def check_shares(shares: Mapping[str, float], *, where: str) -> dict[str, float]
 
 @dataclass(frozen=True)
 class Population:
-    """Shares of the six classes; within a class the knob is drawn from its whole interval (or its centre)."""
+    """Shares of the six classes; within a class the knob is drawn from its whole interval (or its centre).
+
+    `within_class="neutral"` puts everybody at knob 0 (the reference that scalers are fitted on), whatever the shares.
+    """
 
     name: str
     shares: tuple[float, ...]
@@ -103,6 +106,8 @@ class Population:
 
     def draw(self, rng: np.random.Generator) -> DriverStyle:
         """One driver: class by share, place on the knob within the class, then individual variation."""
+        if self.within_class == "neutral":
+            return replace(style_table().at(0.0, rng), name="neutral")
         name = STYLE_CLASSES[int(rng.choice(len(self.shares), p=np.array(self.shares) / sum(self.shares)))]
         low, high = CLASS_INTERVAL[name]
         knob = CLASS_KNOB[name] if self.within_class == "centre" else float(rng.uniform(low, high))

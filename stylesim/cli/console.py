@@ -31,7 +31,7 @@ def show_table(title: str, columns: Sequence[str], rows: Iterable[Sequence[objec
     made = [[str(value) for value in row] for row in rows]
     for i, column in enumerate(columns):
         numeric = bool(made) and all(row[i].replace(".", "").replace("-", "").isdigit() or not row[i] for row in made)
-        table.add_column(column, justify="right" if numeric else "left")
+        table.add_column(column, justify="right" if numeric else "left", no_wrap=i == 0, overflow="fold")
     for row in made:
         table.add_row(*(escape(value) for value in row))
     _out.print(table)

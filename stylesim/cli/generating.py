@@ -61,9 +61,11 @@ def generate(
             scenario, crowd, episodes=episodes, seed=seed, out=out, workers=workers, resume=resume, progress=progress
         )
     counts = corpus.manifest["counts"]
-    drivers = {name: counts.get(f"drivers.{name}", 0) for name in STYLE_CLASSES}
+    names = ("neutral",) if crowd.within_class == "neutral" else STYLE_CLASSES
+    drivers = {name: counts.get(f"drivers.{name}", 0) for name in names}
     total = max(1, sum(drivers.values()))
-    rows = [(name, n, f"{n / total:.3f}", f"{crowd.by_class[name]:.3f}") for name, n in drivers.items()]
+    asked = crowd.by_class | {"neutral": 1.0}
+    rows = [(name, n, f"{n / total:.3f}", f"{asked[name]:.3f}") for name, n in drivers.items()]
     show_table("Drivers", ("style", "drivers", "share", "asked for"), rows)
     others = {key: n for key, n in sorted(counts.items()) if not key.startswith("drivers.") and n}
     if others:

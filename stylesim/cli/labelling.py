@@ -47,7 +47,7 @@ def label(
         labeler = default_labeler(method.value)
     else:
         with progress_bar(f"fitting {method.value} on {fit.name}", "scenes") as progress:
-            labeler = new_labeler(method.value).fit(Corpus(fit), spec=spec, progress=progress)
+            labeler = new_labeler(method.value, history_s=(window,)).fit(Corpus(fit), progress=progress)
     with progress_bar(f"labelling {corpus.name} by {method.value}", "scenes") as progress:
         labels = run(Corpus(corpus), labeler, spec=spec, progress=progress)
     show_table(f"{method.value}: {len(labels)} tracks", ("style", "tracks", "share"), _shares(labels))
@@ -56,9 +56,7 @@ def label(
 
 def labels(
     corpus: Path = typer.Argument(help="A labelled corpus."),
-    join: Path = typer.Option(
-        ..., help="CSV to write: one row per label, with the source's own ids."
-    ),
+    join: Path = typer.Option(..., help="CSV to write: one row per label, with the source's own ids."),
     method: Method = typer.Option(Method.tdbm, help="Which labels."),
     span: str = typer.Option("track", help="track (whole tracks) or history (windows that end at t0)."),
 ) -> None:
