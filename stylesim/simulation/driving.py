@@ -43,7 +43,7 @@ def stop_probability(
 
 
 def needed_deceleration(*, speed_mps: float, distance_m: float, response_s: float) -> float:
-    """v^2 / (2 (d - v t)): what brings a driver to rest at the line who acts after `response_s`; inf if nothing does."""
+    """v^2 / (2 (d - v t)), which brings who acts after `response_s` to rest at the line; inf if nothing does."""
     if speed_mps <= 0.0:
         return 0.0
     left = distance_m - speed_mps * response_s

@@ -7,9 +7,7 @@ from jaxtyping import Float, Int, Int64
 
 from stylesim.geometry import box_corners, boxes_overlap
 
-SWEEP = np.array(
-    [0.8, 0.6]
-)  # neither along nor square to the roads of the shipped scenarios, so that few share a place
+SWEEP = np.array([0.8, 0.6])  # neither along nor square to most roads, so that few vehicles share a place
 
 
 def overlapping_pairs(

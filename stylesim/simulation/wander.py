@@ -17,6 +17,7 @@ from stylesim.style import DriverStyle
 
 FILTER_RAD_PER_S = 1.5  # chosen, because lane keeping shows most power below about 0.25 Hz
 STEERING_RAD_PER_S = 4.0  # of lane changes; chosen, because the lag (2 / 4 s) stays at half a second
+LARGEST_SLIDE_MPS = 1.5  # lateral speed of a lane change at 5 m/s or more, so at most 0.3 of the speed below; chosen
 LARGEST_ACCELERATION_MPS2 = 3.5  # chosen, because 4 m/s2 must hold with what a change of speed adds
 FULL_SPEED_MPS = 5.0  # from there on time runs at its own pace; chosen, because 5 m/s is walking out of a queue
 ROOM_BEYOND_LANE_M = 0.2  # how far a bold driver's side may reach over the marking; chosen
@@ -92,7 +93,7 @@ def smoothed_slide(
     result = np.empty_like(pace_s)
     for frame, goal in enumerate(np.ascontiguousarray(slide_m.T)):
         pull = STEERING_RAD_PER_S**2 * (goal - offset) - 2.0 * STEERING_RAD_PER_S * rate
-        rate += pace_s[frame] * pull
+        rate = np.clip(rate + pace_s[frame] * pull, -LARGEST_SLIDE_MPS, LARGEST_SLIDE_MPS)
         offset = offset + pace_s[frame] * rate
         result[frame] = offset
     return np.ascontiguousarray(result.T)

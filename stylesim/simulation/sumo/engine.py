@@ -27,7 +27,7 @@ class VehicleApi(Protocol):
     def getPosition(self, vehID: str) -> tuple[float, float]: ...  # noqa: D102, N802
     def getLateralLanePosition(self, vehID: str) -> float: ...  # noqa: D102, N802
     def getAngle(self, vehID: str) -> float: ...  # noqa: D102, N802
-    def getLanePosition(self, vehID: str) -> float: ...  # noqa: D102, N802
+    def getNextTLS(self, vehID: str) -> Sequence[tuple[str, int, float, str]]: ...  # noqa: D102, N802
     def getSpeed(self, vehID: str) -> float: ...  # noqa: D102, N802
 
 
@@ -57,12 +57,6 @@ class TrafficLightApi(Protocol):
     def getNextSwitch(self, tlsID: str) -> float: ...  # noqa: D102, N802
 
 
-class LaneApi(Protocol):
-    """The part of `libsumo.lane` used here."""
-
-    def getLastStepVehicleIDs(self, laneID: str) -> Sequence[str]: ...  # noqa: D102, N802
-
-
 class SumoApi(Protocol):
     """The part of libsumo used here."""
 
@@ -70,7 +64,6 @@ class SumoApi(Protocol):
     vehicletype: VehicleTypeApi
     simulation: SimulationApi
     trafficlight: TrafficLightApi
-    lane: LaneApi
 
     def start(self, cmd: list[str]) -> Any: ...  # noqa: D102
     def load(self, args: list[str]) -> Any: ...  # noqa: D102

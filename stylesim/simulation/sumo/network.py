@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import hashlib
-import os
 import subprocess
 import tempfile
 import xml.etree.ElementTree as ET
@@ -75,7 +74,7 @@ def compiled_network(scenario: Scenario, options: SumoOptions, *, speed_limit_mp
     folder.mkdir(parents=True, exist_ok=True)
     with tempfile.TemporaryDirectory(dir=folder, prefix="compiling-") as work:
         made = _compile(sources, types, Path(work), scenario.name)
-        os.replace(made, target)
+        made.replace(target)
     return target
 
 

@@ -31,7 +31,6 @@ class RoadNetwork:
 
     road: Road
     links: tuple[SignalLink, ...]
-    length_m: dict[str, float]  # of each lane, as SUMO counts it
     edges: tuple[str, ...]  # those between junctions
 
     def controlled_lanes(self) -> tuple[str, ...]:
@@ -70,11 +69,9 @@ def read_network(path: Path) -> RoadNetwork:
             )
     controlled = {link.lane for link in links}
     lanes = [lane for edge in edges for lane in _lanes(edge, successors, controlled)]
-    length = {lane.attrib["id"]: float(lane.attrib["length"]) for edge in edges for lane in edge.findall("lane")}
     outer = tuple(e.attrib["id"] for e in edges if e.get("function") != "internal")
-    return RoadNetwork(
-        Road(tuple(lanes)), tuple(sorted(links, key=lambda link: (link.signal, link.index))), length, outer
-    )
+    ordered = tuple(sorted(links, key=lambda link: (link.signal, link.index)))
+    return RoadNetwork(Road(tuple(lanes)), ordered, outer)
 
 
 def _lanes(edge: ET.Element, successors: dict[str, list[str]], controlled: set[str]) -> list[Lane]:

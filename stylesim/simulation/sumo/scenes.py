@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
-from jaxtyping import Bool, Int32
+from jaxtyping import Bool, Int32, Int64
 
 from stylesim.scene import Scene
 from stylesim.signals import Signals
@@ -60,9 +60,7 @@ def _tracks(
     lanes = {lane.lane_id: lane for lane in files.network.road.lanes}
     flags = flags_of(bodies, log, logged=logged, first_step=warm, signals=signals, lanes=lanes, decisions=decisions)
     keep = np.flatnonzero(np.bincount(bodies.driver[logged], minlength=len(log.driver_ids)))
-    tracks = _dense(
-        bodies, files, log.driver_ids, flags, logged=logged, keep=keep.astype(np.int32), warm=warm, frames=frames
-    )
+    tracks = _dense(bodies, files, log.driver_ids, flags, logged=logged, keep=keep, warm=warm, frames=frames)
     counts = _counts(tracks, log, warm)
     counts["settling_steps_dropped"] = int((in_time & ~logged).sum())
     return tracks, counts | _overlap_counts(bodies, files, log.driver_ids, logged)
@@ -75,7 +73,7 @@ def _dense(
     flags: Int32[np.ndarray, " driver"],
     *,
     logged: Bool[np.ndarray, " row"],
-    keep: Int32[np.ndarray, " agent"],
+    keep: Int64[np.ndarray, " agent"],
     warm: int,
     frames: int,
 ) -> Tracks:
@@ -106,9 +104,9 @@ def _dense(
 def _counts(tracks: Tracks, log: RawLog, warm: int) -> dict[str, int]:
     """Flags by name (tracks that carry them), collisions by pair, and drivers by style."""
     names = {flag.name.lower(): flag for flag in TrackFlag if flag.name is not None}
-    wanted = ("emergency_braked", "ran_red", "teleported", "removed", "decided_stop", "decided_go")
-    wanted += ("stopped_at_line", "crossed_on_yellow", "collided")
-    counts = {name: int(tracks.flagged(names[name]).sum()) for name in wanted}
+    outcomes = ("emergency_braked", "ran_red", "teleported", "removed", "collided")
+    answers = ("decided_stop", "decided_go", "stopped_at_line", "crossed_on_yellow")
+    counts = {name: int(tracks.flagged(names[name]).sum()) for name in outcomes + answers}
     counts["collisions"] = len({tuple(sorted(pair)) for step, *pair in log.collisions if step >= warm})
     styles = [style.name for style in tracks.driver if style is not None]
     return counts | {f"style_{name}": styles.count(name) for name in STYLE_CLASSES}
