@@ -143,5 +143,5 @@ def markdown(evaluation: Evaluation) -> str:
             cells += [interval_text(item.metrics[name]) for name in METRICS]
             lines.append(f"| {' | '.join(map(_markdown_cell, cells))} |")
     lines += ["", "## What was asked, and what was not", ""]
-    lines += [f"* {name}: {count}" for name, count in evaluation.counts.items()]
+    lines += [f"* {name}: {count}" for name, count in sorted(evaluation.counts.items())]
     return "\n".join(lines) + "\n"

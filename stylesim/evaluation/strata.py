@@ -26,6 +26,20 @@ def parts_of(by: str) -> tuple[str, ...]:
     return tuple(part.strip() for part in by.split("*"))
 
 
+def title_of(by: str) -> str:
+    """A stratum in words, for headings: "history:tdbm" -> "TDBM class of the history"."""
+
+    def one(stratum: str) -> str:
+        first, _, second = stratum.partition(":")
+        if stratum in PLAIN:
+            return "commanded style" if stratum == "commanded" else stratum
+        if first == "history":
+            return f"{second.upper()} class of the history"
+        return f"{first.upper()} class of the track" + (f" ({second})" if second else "")
+
+    return " × ".join(one(part) for part in parts_of(by))
+
+
 def _names(labels: StyleLabels, *, transposed: bool) -> list[str]:
     style = labels.style_transposed if transposed else labels.style
     if style is None:

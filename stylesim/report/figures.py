@@ -11,10 +11,12 @@ from matplotlib.ticker import MaxNLocator
 
 from stylesim.evaluation.results import HEADINGS, Evaluation
 from stylesim.evaluation.slices import Slice, value_order
+from stylesim.evaluation.strata import title_of
 from stylesim.report.theme import SERIES_COLOUR, SERIES_MARKER, drawing, new_figure
 
-Curve = Sequence[Mapping[str, float]]  # records with epoch, train_loss, val_loss, val_min_fde_m
+Curve = Sequence[Mapping[str, int | float | None]]  # records with epoch, train_loss, val_loss, val_min_fde_m
 WIDTH = 8.6  # inches; the page's column
+MOST_UPRIGHT = 8  # chosen: more names do not fit beside one another
 MOST_CELLS = 40  # chosen: above it a figure of cells cannot be read and the table has to do
 
 
@@ -23,21 +25,51 @@ def cell_values(evaluations: Sequence[Evaluation], by: str) -> list[str]:
     return sorted({item.value for one in evaluations if by in one.by for item in one.slices_by(by)}, key=value_order)
 
 
-def _tick(cells: Sequence[Slice], value: str) -> str:
+def _tick(cells: Sequence[Slice], value: str, *, upright: bool) -> str:
     """The value with the n of its largest cell; forecasters on one corpus share it."""
     size = max((c.size for c in cells if c.value == value), key=lambda s: s.n_drivers)
-    return f"{value.replace(' × ', chr(10))}\nn = {size.n_drivers}\n{size.n_units} units"
+    between = "\n" if upright else ", "
+    return between.join([f"{value}\nn = {size.n_drivers}", f"{size.n_units} units"])
 
 
-def _series(axes: Axes, cells: Sequence[Slice], values: Sequence[str], metric: str, place: float, number: int) -> None:
+def _series(
+    axes: Axes, cells: Sequence[Slice], values: Sequence[str], metric: str, place: float, number: int, upright: bool
+) -> None:
     colour, marker = SERIES_COLOUR[number % len(SERIES_COLOUR)], SERIES_MARKER[number % len(SERIES_MARKER)]
     for item in cells:
-        estimate, x = item.metrics[metric], values.index(item.value) + place
+        estimate, at = item.metrics[metric], values.index(item.value) + place
         if estimate.refused:
             continue
         within = estimate.status == "within site"
-        axes.plot([x, x], [estimate.low, estimate.high], color=colour, lw=1.6, ls=":" if within else "-")
-        axes.plot([x], [estimate.value], marker, color=colour, mfc="white" if within else colour, ms=6)
+        bar, point = ([at, at], [estimate.low, estimate.high]), ([at], [estimate.value])
+        axes.plot(*(bar if upright else bar[::-1]), color=colour, lw=1.6, ls=":" if within else "-")
+        axes.plot(*(point if upright else point[::-1]), marker, color=colour, mfc="white" if within else colour, ms=6)
+
+
+def _category_axis(axes: Axes, cells: Sequence[Slice], values: Sequence[str], metric: str, *, upright: bool) -> None:
+    """Names and n of the cells on their axis, "too few" where none is shown, the metric on the other."""
+    ticks = [_tick(cells, value, upright=upright) for value in values]
+    for at, value in enumerate(values):
+        if all(item.metrics[metric].refused for item in cells if item.value == value):
+            axes.annotate(
+                "too few",
+                (at, 0.02) if upright else (0.01, at),
+                xycoords=("data", "axes fraction") if upright else ("axes fraction", "data"),
+                ha="center" if upright else "left",
+                va="bottom" if upright else "center",
+                color="#6B7680",
+            )
+    if upright:
+        axes.set_xticks(range(len(values)), ticks, fontsize=8)
+        axes.set_xlim(-0.6, len(values) - 0.4)
+        axes.set_ylim(bottom=0)
+        axes.set_ylabel(HEADINGS[metric])
+    else:
+        axes.set_yticks(range(len(values)), ticks, fontsize=8)
+        axes.set_ylim(len(values) - 0.4, -0.6)
+        axes.set_xlim(left=0)
+        axes.set_xlabel(HEADINGS[metric])
+    axes.grid(visible=False, axis="x" if upright else "y")
 
 
 def error_figure(evaluations: Sequence[Evaluation], by: str, *, metric: str = "min_fde_m") -> Figure | None:
@@ -51,32 +83,23 @@ def error_figure(evaluations: Sequence[Evaluation], by: str, *, metric: str = "m
     if not values or len(values) > MOST_CELLS or all(item.metrics[metric].refused for item in every):
         return None
     with drawing():
-        figure, (axes,) = new_figure(WIDTH, 3.9)
+        upright = len(values) <= MOST_UPRIGHT
+        figure, (axes,) = new_figure(WIDTH, 3.9 if upright else 1.2 + 0.42 * len(values))
         places = (np.arange(len(shown)) - (len(shown) - 1) / 2) * min(0.16, 0.7 / len(shown))
         for number, one in enumerate(shown):
-            _series(axes, one.slices_by(by), values, metric, float(places[number]), number)
+            _series(axes, one.slices_by(by), values, metric, float(places[number]), number, upright)
             colour, marker = SERIES_COLOUR[number % len(SERIES_COLOUR)], SERIES_MARKER[number % len(SERIES_MARKER)]
             axes.plot([], [], marker, color=colour, label=one.forecaster)
-        for x, value in enumerate(values):
-            if all(item.metrics[metric].refused for item in every if item.value == value):
-                axes.annotate("too few", (x, 0.02), xycoords=("data", "axes fraction"), ha="center", color="#6B7680")
-        axes.set_xticks(range(len(values)), [_tick(every, value) for value in values], fontsize=8)
-        axes.set_xlim(-0.6, len(values) - 0.4)
-        axes.set_ylim(bottom=0)
-        axes.grid(visible=False, axis="x")
-        axes.set_ylabel(HEADINGS[metric])
-        axes.set_title(f"{HEADINGS[metric].split(' (')[0]} by {by}, mean over drivers with 95 % intervals")
+        _category_axis(axes, every, values, metric, upright=upright)
+        axes.set_title(f"{HEADINGS[metric].split(' (')[0]} by {title_of(by)}: mean over drivers, 95 % intervals")
         figure.legend(loc="outside lower center", ncols=min(4, len(shown)))
     return figure
 
 
 def finite_pairs(curve: Curve, name: str) -> tuple[list[float], list[float]]:
     """(epochs, values) of one quantity of a training record, where it was measured."""
-    pairs = [
-        (float(point["epoch"]), float(point[name]))
-        for point in curve
-        if point.get(name) is not None and np.isfinite(point[name])
-    ]
+    found = [(point.get("epoch"), point.get(name)) for point in curve]
+    pairs = [(float(e), float(v)) for e, v in found if e is not None and v is not None and np.isfinite(v)]
     return [epoch for epoch, _ in pairs], [value for _, value in pairs]
 
 

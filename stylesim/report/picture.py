@@ -74,14 +74,12 @@ def _draw_tracks(axes: Axes, scene: Scene, styles: tuple[str, ...], shown: Bool[
         chosen = np.array([style == name for style in styles])
         dots = tracks.position_m[chosen][shown[chosen]]
         axes.scatter(dots[:, 0], dots[:, 1], s=4.0, color=style_colour(name), linewidths=0, zorder=4)
-        last = [(agent, int(np.flatnonzero(shown[agent])[-1])) for agent in np.flatnonzero(chosen & shown.any(axis=1))]
-        boxes = [
-            box_corners(tracks.position_m[a, f], tracks.heading_rad[a, f], tracks.size_m[a])
-            for a, f in last
-            if np.isfinite(tracks.size_m[a]).all() and np.isfinite(tracks.heading_rad[a, f])
-        ]
+        agents = np.flatnonzero(chosen & shown.any(axis=1))
+        last = shown.shape[1] - 1 - shown[agents, ::-1].argmax(axis=1)
+        boxes = box_corners(tracks.position_m[agents, last], tracks.heading_rad[agents, last], tracks.size_m[agents])
+        boxes = boxes[np.isfinite(boxes).all(axis=(1, 2))]  # a road user of unknown size has none
         axes.add_collection(
-            PolyCollection(boxes, facecolors=style_colour(name), edgecolors="white", linewidths=0.4, zorder=5)
+            PolyCollection(list(boxes), facecolors=style_colour(name), edgecolors="white", linewidths=0.4, zorder=5)
         )
 
 
@@ -111,7 +109,7 @@ def scene_figure(
     low, high = low - MARGIN_M, high + MARGIN_M
     span = high - low
     with drawing():
-        height = float(np.clip(WIDTH * 0.8 * span[1] / span[0] + 1.2, 2.0, 8.0))
+        height = float(np.clip(WIDTH * 0.92 * span[1] / span[0] + 1.2, 2.0, 8.5))
         figure = Figure(figsize=(WIDTH, height), layout="constrained")
         axes = figure.subplots()
         if scene.road is not None:
@@ -129,5 +127,5 @@ def scene_figure(
         what = f"{labels.method.upper()} class" if labels is not None else "class"
         seconds = (stop - first) * tracks.dt_s
         axes.set_title(f"{scene.scene_id}: {seconds:.0f} s of traffic, one dot per {DOT_S:g} s, by {colour} {what}")
-        axes.legend(loc="upper left", bbox_to_anchor=(1.0, 1.0))
+        figure.legend(loc="outside lower center", ncols=5)
     return figure

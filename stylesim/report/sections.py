@@ -13,6 +13,7 @@ from stylesim.evaluation.evaluate import corpus_facts
 from stylesim.evaluation.label_summary import LabelSummary, label_summary
 from stylesim.evaluation.results import HEADINGS, Evaluation, interval_text
 from stylesim.evaluation.slices import ALL, STANDING
+from stylesim.evaluation.strata import title_of
 from stylesim.evaluation.yellow import yellow_decisions
 from stylesim.report import style_figures
 from stylesim.report.figures import Curve, error_figure, loss_figure
@@ -26,7 +27,8 @@ DEFINITIONS = (
     "error; top-1 FDE is the final error of the most probable mode. "
     "A driver counts once, with the mean of its windows. Intervals resample units (a recording at one site, or an "
     "episode), then drivers. A cell of fewer than 30 drivers is refused; with fewer than 3 units the interval "
-    "resamples drivers only, is marked “within site”, and says nothing about other sites."
+    "resamples drivers only, is marked “within site”, and says nothing about other sites. A class of the whole "
+    "track has seen the future: it sorts drivers here and is never given to a forecaster."
 )
 
 
@@ -71,7 +73,7 @@ def errors_section(evaluations: Sequence[Evaluation], *, seed: int) -> Section:
             caption = (
                 "Points are means over drivers, bars 95 % intervals; hollow points with dotted bars are within-site."
             )
-            blocks += picture(error_figure(evaluations, by), caption, heading=f"By {by}")
+            blocks += picture(error_figure(evaluations, by), caption, heading=f"By {title_of(by)}")
             blocks.append(Block(table=error_table(evaluations, by)))
         difference = difference_table(evaluations, by, seed=seed)
         blocks += [] if difference is None else [Block(table=difference, fold=by not in unfolded)]
@@ -132,8 +134,7 @@ def _confusion_blocks(summaries: Sequence[LabelSummary]) -> list[Block]:
         caption = (
             f"Simulated drivers of {summary.corpus}: a perfect labeller of a perfect simulator has 100 on the diagonal."
         )
-        if summary.method == "tdbm":
-            caption += f" {style_figures.rank_note()}"
+        caption = f"{caption} {style_figures.rank_note(summary)}".strip()
         blocks += picture(style_figures.confusion_figure(summary), caption)
     return blocks
 
@@ -183,8 +184,10 @@ def provenance_section(evaluations: Sequence[Evaluation], corpora: Sequence[Corp
     blocks = [Block(table=facts_table(f"Corpus {c.path.name}", _flat(corpus_facts(c)))) for c in corpora]
     for one in evaluations:
         facts = {key: value for key, value in one.about.items() if key != "labels"}
-        blocks.append(Block(table=facts_table(f"Evaluation of {one.forecaster}", _flat(facts))))
-        blocks.append(Block(table=facts_table(f"{one.forecaster}: what was asked, and what was not", one.counts)))
+        blocks.append(Block(table=facts_table(f"Evaluation of {one.forecaster}", _flat(facts)), fold=True))
+        blocks.append(
+            Block(table=facts_table(f"{one.forecaster}: what was asked, and what was not", one.counts), fold=True)
+        )
         raw = json.dumps(one.about["labels"], indent=1, sort_keys=True)
         blocks.append(Block(caption=f"{one.forecaster}: provenance of the labels", raw=raw))
     return Section("provenance", "What was evaluated", (f"Metrics: {', '.join(HEADINGS.values())}.",), tuple(blocks))

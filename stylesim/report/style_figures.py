@@ -85,16 +85,22 @@ def confusion_figure(summary: LabelSummary) -> Figure | None:
         axes.grid(visible=False)
         axes.set_xlabel("measured class")
         axes.set_ylabel("commanded class")
-        rank = confusion.knob_rank_correlation
-        note = f"; knob and measured aggressiveness: Spearman {rank:.2f}" if np.isfinite(rank) else ""
-        axes.set_title(f"Measured {summary.method.upper()} class of commanded drivers (% of row){note}", size=9)
+        axes.set_title(f"Measured {summary.method.upper()} class of commanded drivers, % of row")
     return figure
 
 
-def rank_note() -> str:
-    """What to hold a Spearman of classes against (REFERENCE section 1 [computed])."""
+def rank_note(summary: LabelSummary) -> str:
+    """How knob and measured aggressiveness go together, and what to hold it against (REFERENCE section 1)."""
+    rank = summary.confusion.knob_rank_correlation if summary.confusion else float("nan")
+    if not np.isfinite(rank):
+        return ""
     low, high = RANK_CEILING
-    return f"Even with perfect classes the Spearman of TDBM ranks is only {low}–{high}."
+    ceiling = (
+        f"; between ranks of classes even perfect classes reach only {low} to {high}"
+        if summary.method == "tdbm"
+        else ""
+    )
+    return f"Spearman between the commanded knob and the measured aggressiveness: {rank:.2f}{ceiling}."
 
 
 def stop_probability_figure(decisions: YellowDecisions) -> Figure:
@@ -120,5 +126,5 @@ def stop_probability_figure(decisions: YellowDecisions) -> Figure:
         axes.set_xlabel("time to the stop line at the onset of yellow (s)")
         axes.set_ylabel("share that decides to stop")
         axes.set_title(f"Stop or go at the yellow by commanded style ({YELLOW_BIN_S:g} s bins of {MIN_BIN} or more)")
-        axes.legend(loc="upper left", bbox_to_anchor=(1.0, 1.0))
+        figure.legend(loc="outside lower center", ncols=4)
     return figure

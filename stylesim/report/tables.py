@@ -12,6 +12,7 @@ from stylesim.evaluation.label_summary import FRAGILE_MARGIN, LabelSummary
 from stylesim.evaluation.metrics import METRICS
 from stylesim.evaluation.results import HEADINGS, Evaluation
 from stylesim.evaluation.slices import ALL, STANDING, Slice, value_order
+from stylesim.evaluation.strata import title_of
 from stylesim.report.figures import cell_values
 
 EM = "–"
@@ -79,9 +80,11 @@ def error_table(evaluations: Sequence[Evaluation], by: str) -> Table:
             own = Cell(name, "" if len(sizes) == 1 else n)
             rows.append((*lead, own, *(estimate_cell(item.metrics[metric]) for metric in METRICS)))
     what = {ALL: "All drivers that move", STANDING: "Agents that stand (< 1 m in the future), in no other table"}
-    caption = f"{what.get(by, f'By {by}')}: mean over drivers, 95 % interval below."
+    caption = f"{what.get(by, f'By {title_of(by)}')}: mean over drivers, 95 % interval below."
     return Table(
-        caption, ("" if by == ALL else by, "forecaster", *(HEADINGS[metric] for metric in METRICS)), tuple(rows)
+        caption,
+        ("" if by in (ALL, STANDING) else title_of(by), "forecaster", *(HEADINGS[metric] for metric in METRICS)),
+        tuple(rows),
     )
 
 
@@ -110,7 +113,9 @@ def difference_table(evaluations: Sequence[Evaluation], by: str, *, seed: int) -
                 (*lead, Cell(name), *(estimate_cell(cells[value][metric], judge=True, digits=3) for metric in METRICS))
             )
     caption = f"Difference to {baseline.forecaster}, same drivers: below 0 is better; 95 % interval of the paired mean."
-    return Table(caption, ("" if by == ALL else by, "forecaster", *(f"Δ {HEADINGS[m]}" for m in METRICS)), tuple(rows))
+    return Table(
+        caption, ("" if by == ALL else title_of(by), "forecaster", *(f"Δ {HEADINGS[m]}" for m in METRICS)), tuple(rows)
+    )
 
 
 def percent(share: float) -> Cell:

@@ -38,7 +38,8 @@ STYLE_MARKER = {
     "normal": "o",
     "neutral": "X",
 }
-UNJUDGED_COLOUR = "#9A9A9A"  # undetermined, unlabelled, not commanded
+UNJUDGED_COLOUR = "#8F979E"  # undetermined
+UNKNOWN_COLOUR = "#C3CAD1"  # nobody judged or commanded it
 SERIES_COLOUR = ("#004488", "#BB5566", "#DDAA33", "#444444", "#66A5AD", "#8E6C8A")
 SERIES_MARKER = ("o", "s", "D", "^", "v", "P")
 INK, FAINT, SURFACE = "#1F2933", "#D9DEE3", "#EEF1F4"
@@ -85,8 +86,8 @@ def new_figure(width: float, height: float, *, columns: int = 1) -> tuple[Figure
 
 
 def style_colour(name: str) -> str:
-    """The colour of a class; grey for what is no class."""
-    return STYLE_COLOUR.get(name, UNJUDGED_COLOUR)
+    """The colour of a class; greys for "undetermined" and for what is no class."""
+    return UNJUDGED_COLOUR if name == "undetermined" else STYLE_COLOUR.get(name, UNKNOWN_COLOUR)
 
 
 def style_marker(name: str) -> str:

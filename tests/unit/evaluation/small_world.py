@@ -12,7 +12,7 @@ from stylesim.scene import Scene
 from stylesim.signals import Signals
 from stylesim.style import STYLE_CLASSES
 from stylesim.styles import style_table
-from stylesim.tracks import AgentKind, Tracks, TrackFlag
+from stylesim.tracks import AgentKind, TrackFlag, Tracks
 
 DT_S = 0.1
 FRAMES = 150
@@ -95,7 +95,7 @@ def labels(scenes: list[Scene], span: str, *, anchors: tuple[int, ...] = ()) -> 
         feature_names=("v_avg",),
         scene_id=tuple(s.scene_id for s, _, _ in rows),
         agent_id=tuple(s.tracks.agent_id[agent] for s, agent, _ in rows),
-        start_frame=np.zeros(n),
+        start_frame=np.zeros(n, np.int32),
         stop_frame=np.array([stop for _, _, stop in rows]),
         score=score,
         style=style,
