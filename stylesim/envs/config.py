@@ -38,7 +38,7 @@ class EnvConfig(Spec):
     """Everything that `gym.make(id, config={...})` accepts; see docs/environments.md."""
 
     duration_s: float = Field(default=60.0, gt=0, le=3600)
-    period_s: float = Field(default=0.2, ge=0.1, le=5.0)  # time between two decisions
+    period_s: float = Field(default=0.1, ge=0.1, le=5.0)  # time between two decisions, a multiple of 0.1 s
     neighbours: int = Field(default=8, ge=1, le=64)
     perception_m: float = Field(default=100.0, gt=0, le=500)  # farther vehicles are not seen
     max_speed_mps: float = Field(default=40.0, gt=0, le=60)  # of the ego: what the discrete action can ask for
@@ -56,16 +56,18 @@ class EnvConfig(Spec):
     cost: CostWeights = CostWeights()
 
     @model_validator(mode="after")
-    def _ordered(self) -> EnvConfig:
+    def _fits(self) -> EnvConfig:
         low, high = self.onset_tts_s
         if not 0 < low <= high <= 10:
             raise ValueError(f"onset_tts_s needs 0 < low <= high <= 10, not {self.onset_tts_s}")
+        if abs(self.period_s / 0.1 - round(self.period_s / 0.1)) > 1e-6:
+            raise ValueError(f"period_s must be a multiple of 0.1 s, not {self.period_s}")
         return self
 
     @property
     def control_steps(self) -> int:
         """Simulation steps of 0.1 s between two decisions."""
-        return max(1, round(self.period_s / 0.1))
+        return round(self.period_s / 0.1)
 
 
 def configured(changes: Mapping[str, Any] | EnvConfig | None, *, where: str, **defaults: Any) -> EnvConfig:

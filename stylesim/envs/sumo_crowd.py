@@ -8,26 +8,26 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from jaxtyping import Float64
+from jaxtyping import Float64, Int64
 
-from stylesim.envs.world import DECIDED_GO, DECIDED_STOP, NO_DECISION, Picture
+from stylesim.envs.sumo_light import LightWatch
+from stylesim.envs.world import DECIDED_GO, DECIDED_STOP, Picture
 from stylesim.errors import InputError
 from stylesim.population import Population
 from stylesim.scenario import Scenario
 from stylesim.signals import SignalState
 from stylesim.simulation.sumo.engine import Engine
 from stylesim.simulation.sumo.episode import DT_S, prepare_episode, sumo_options
-from stylesim.simulation.sumo.roads import RoadNetwork
-from stylesim.simulation.sumo.signals import STATES
 from stylesim.simulation.sumo.yellow import YellowController
-from stylesim.style import DriverStyle
+from stylesim.style import STYLE_CLASSES
 
 
 class SumoCrowd:
     """Loads an episode into the engine and steps it; knows every driver's style and what it did at the light.
 
     `extra_s` is how long after the scenario's own end drivers must still come in. Vehicles that the episode's files
-    do not know (an ego) take part in the traffic, and are left out of `names` and `poses`.
+    do not know (an ego) take part in the traffic, and are left out of `rows` and `poses`. Drivers are numbered by
+    their time of entry; `style`, `knob`, `decision`, `ran_red` and `collided` hold one value for each of them.
     """
 
     def __init__(
@@ -41,19 +41,21 @@ class SumoCrowd:
             engine.load(sumo_options(self.files))  # reads the files whole
         self._engine = engine
         self.sumo: Any = engine.sumo
-        self.signal = self.files.options.signal.junction
         self._yellow = YellowController(engine.sumo, self.files)
         self._events_seen = 0
         self._step = 0
-        self._index: dict[str, int] = {}
-        self.names: list[str] = []
-        self.collided: set[str] = set()
-        self.ran_red: set[str] = set()
-        self.decision: dict[str, int] = {}
-        self._main_link = [_main_link(self.files.network, lane) for lane in self.files.network.controlled_lanes()]
-        self._on_lane: dict[str, set[str]] = {lane: set() for lane in self.files.network.controlled_lanes()}
-        self._shown = ""
-        self._onset_step: list[int] = []
+        self._light = LightWatch(engine.sumo, self.files.network, self.files.options.signal.junction)
+        drivers = self.files.drivers.values()
+        self._number = {driver.driver_id: number for number, driver in enumerate(drivers)}
+        self._size = np.array([(driver.length_m, driver.width_m) for driver in drivers]).reshape(-1, 2)
+        self.style = np.array([STYLE_CLASSES.index(driver.style.name) for driver in drivers], np.int8)
+        self.knob = np.array([driver.style.aggressiveness for driver in drivers], np.float32)
+        self.decision = np.zeros(len(drivers), np.int8)
+        self.ran_red = np.zeros(len(drivers), bool)
+        self.collided = np.zeros(len(drivers), bool)
+        self.foreign_collided: set[str] = set()
+        self._here: dict[str, int] = {}
+        self.rows: Int64[np.ndarray, " vehicle"] = np.zeros(0, np.int64)
         self._poses: Float64[np.ndarray, "vehicle 7"] | None = None
 
     @property
@@ -61,98 +63,75 @@ class SumoCrowd:
         """SUMO's clock."""
         return self._step * DT_S
 
-    def style(self, name: str) -> DriverStyle:
-        """The commanded style of a driver."""
-        return self.files.drivers[name].style
+    def run_until(self, time_s: float) -> None:
+        """Step until SUMO's clock shows `time_s`."""
+        while self.time_s < time_s - DT_S / 2:
+            self.step()
 
     def step(self) -> None:
         """0.1 s, with the drivers' decisions at yellow."""
         self._yellow.before_step(self._step)
         self._engine.step()
         self._step += 1
-        self._watch_light()
         self._poses = None
-        self.names = [name for name in self.sumo.vehicle.getIDList() if name in self.files.drivers]
+        self._follow_traffic()
         for event in self._yellow.events[self._events_seen :]:
-            self.decision[event.driver_id] = DECIDED_STOP if event.stop else DECIDED_GO
+            self.decision[self._number[event.driver_id]] = DECIDED_STOP if event.stop else DECIDED_GO
         self._events_seen = len(self._yellow.events)
+        for name in self._light.after_step(self._step):
+            if name in self._number:
+                self.ran_red[self._number[name]] = True
         for collision in self.sumo.simulation.getCollisions():
-            self.collided |= {collision.collider, collision.victim}
-        self._watch_stop_lines()
+            self._note_collision(collision.collider)
+            self._note_collision(collision.victim)
 
-    def run_until(self, time_s: float) -> None:
-        """Step until SUMO's clock shows `time_s`."""
-        while self.time_s < time_s - DT_S / 2:
-            self.step()
+    def _note_collision(self, name: str) -> None:
+        number = self._number.get(name)
+        if number is None:
+            self.foreign_collided.add(name)
+        else:
+            self.collided[number] = True
 
-    def _watch_light(self) -> None:
-        """Remember since when each link has been shown what it is shown."""
-        shown = str(self.sumo.trafficlight.getRedYellowGreenState(self.signal))
-        if shown == self._shown:
-            return
-        before = self._shown or " " * len(shown)
-        since = self._onset_step or [self._step] * len(shown)
-        self._onset_step = [
-            self._step if a.lower() != b.lower() else s for a, b, s in zip(before, shown, since, strict=True)
-        ]
-        self._shown = shown
-
-    def light(self, link: int) -> tuple[SignalState, float]:
-        """What one link is shown, and for how many seconds it has been."""
-        return STATES.get(self._shown[link], SignalState.UNKNOWN), (self._step - self._onset_step[link]) * DT_S
-
-    def _watch_stop_lines(self) -> None:
-        """Who has left a lane that ends at the light into the junction has crossed its stop line."""
-        for lane, before in self._on_lane.items():
-            now = set(self.sumo.lane.getLastStepVehicleIDs(lane))
-            for name in before - now:
-                if self._lane_shows_red(lane) and self._inside_junction(name):
-                    self.ran_red.add(name)
-            self._on_lane[lane] = now
-
-    def _lane_shows_red(self, lane: str) -> bool:
-        links = [link for link in self.files.network.links if link.lane == lane]
-        return all(STATES.get(self._shown[link.index]) is SignalState.RED for link in links)
-
-    def _inside_junction(self, name: str) -> bool:
-        here = self.sumo.vehicle
-        return name in here.getIDList() and here.getRoadID(name).startswith(":")
-
-    def decided(self, name: str) -> int:
-        """NO_DECISION, DECIDED_STOP or DECIDED_GO at the last yellow that concerned this driver."""
-        return self.decision.get(name, NO_DECISION)
+    def _follow_traffic(self) -> None:
+        """Who is there: the list is only asked for when somebody has come or gone."""
+        simulation = self.sumo.simulation
+        if simulation.getDepartedNumber() or simulation.getArrivedNumber() or not self._here:
+            self._here = {n: self._number[n] for n in self.sumo.vehicle.getIDList() if n in self._number}
+            self.rows = np.fromiter(self._here.values(), np.int64, len(self._here))
 
     def poses(self) -> Float64[np.ndarray, "vehicle 7"]:
-        """Box centres, velocities, headings and sizes of `names`; computed once per step."""
+        """Box centres, velocities, headings and sizes of `rows`; computed once per step."""
         if self._poses is None:
-            drivers = [self.files.drivers[name] for name in self.names]
-            size = np.array([(driver.length_m, driver.width_m) for driver in drivers]).reshape(-1, 2)
-            self._poses = poses_of(self.sumo, self.names, size)
+            self._poses = poses_of(self.sumo, list(self._here), self._size[self.rows])
         return self._poses
 
+    def light(self, link: int) -> tuple[SignalState, float]:
+        """What one link of the light is shown, and for how many seconds it has been."""
+        return self._light.shown_since(link)
+
+    def lights(self) -> list[SignalState]:
+        """What each controlled lane is shown, in the order of the picture's stop lines."""
+        return self._light.by_lane()
+
     def picture(self) -> Picture:
-        """Road and stop lines, one for each controlled lane in the order of `lights`."""
+        """Road and stop lines, one for each controlled lane."""
         road = self.files.network.road
         lines = [road.lane(lane).stop_line_m for lane in self.files.network.controlled_lanes()]
         return Picture(road, np.array(lines, np.float64).reshape(-1, 2, 2))
-
-    def lights(self) -> list[SignalState]:
-        """What each controlled lane is shown: its straight movement's light if it has one."""
-        return [STATES.get(self._shown[link], SignalState.UNKNOWN) for link in self._main_link]
-
-
-def _main_link(network: RoadNetwork, lane: str) -> int:
-    links = [link for link in network.links if link.lane == lane]
-    return min(links, key=lambda link: (link.direction != "s", link.index)).index
 
 
 def poses_of(sumo: Any, names: list[str], size_m: Float64[np.ndarray, "vehicle 2"]) -> Float64[np.ndarray, "vehicle 7"]:
     """x, y, vx, vy, heading, length, width: SUMO's front bumpers and compass angles turned into ours."""
     vehicle, n = sumo.vehicle, len(names)
+    pose = np.empty((n, 7))
     front = np.fromiter(chain.from_iterable(map(vehicle.getPosition, names)), np.float64, 2 * n).reshape(n, 2)
     heading = np.pi / 2 - np.radians(np.fromiter(map(vehicle.getAngle, names), np.float64, n))
     speed = np.fromiter(map(vehicle.getSpeed, names), np.float64, n)
-    along = np.stack([np.cos(heading), np.sin(heading)], axis=1)
-    centre = front - along * size_m[:, :1] / 2
-    heading = np.remainder(heading + np.pi, 2 * np.pi) - np.pi
-    return np.concatenate([centre, speed[:, None] * along, heading[:, None], size_m], axis=1)
+    cos, sin, half = np.cos(heading), np.sin(heading), size_m[:, 0] / 2
+    pose[:, 0] = front[:, 0] - cos * half
+    pose[:, 1] = front[:, 1] - sin * half
+    pose[:, 2] = speed * cos
+    pose[:, 3] = speed * sin
+    pose[:, 4] = np.remainder(heading + np.pi, 2 * np.pi) - np.pi
+    pose[:, 5:] = size_m
+    return pose

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from bisect import bisect_right
+from typing import Any
+
 import numpy as np
 
 from stylesim.envs.config import EnvConfig
@@ -30,6 +33,7 @@ class SumoEgo:
         self._steps = 0
         self._link: int | None = None  # of the light ahead
         self._stop_line_m = np.inf
+        self._directions: dict[str, tuple[list[float], list[float]]] = {}
         self._last = EgoState()
         self.present = True
 
@@ -109,14 +113,20 @@ class SumoEgo:
         }
 
     def _lane_direction(self, lane: str) -> float:
-        at = self._sumo.vehicle.getLanePosition(EGO)
-        shape = np.array(self._sumo.lane.getShape(lane))
-        along = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(shape, axis=0).T))])
-        along *= self._sumo.lane.getLength(lane) / along[-1]  # SUMO's length may differ from the drawn shape's
-        segment = int(np.clip(np.searchsorted(along, at) - 1, 0, len(shape) - 2))
-        step = shape[segment + 1] - shape[segment]
-        return float(np.arctan2(step[1], step[0]))
+        if lane not in self._directions:
+            self._directions[lane] = _directions(self._sumo, lane)
+        starts, angles = self._directions[lane]
+        return angles[max(bisect_right(starts, self._sumo.vehicle.getLanePosition(EGO)) - 1, 0)]
 
     def _at_light(self) -> dict[str, float]:
         state, since_s = (SignalState.UNKNOWN, 0.0) if self._link is None else self._crowd.light(self._link)
         return {"signal_state": float(state), "stop_line_m": self._stop_line_m, "since_onset_s": since_s}
+
+
+def _directions(sumo: Any, lane: str) -> tuple[list[float], list[float]]:
+    """Where each straight piece of a lane starts along it, and its angle."""
+    shape = np.array(sumo.lane.getShape(lane))
+    pieces = np.diff(shape, axis=0)
+    along = np.concatenate([[0.0], np.cumsum(np.hypot(pieces[:, 0], pieces[:, 1]))])
+    along *= sumo.lane.getLength(lane) / along[-1]  # SUMO's length may differ from the drawn shape's
+    return along[:-1].tolist(), np.arctan2(pieces[:, 1], pieces[:, 0]).tolist()

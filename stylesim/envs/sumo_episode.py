@@ -15,10 +15,6 @@ from stylesim.population import Population
 from stylesim.randomness import stream
 from stylesim.scenario import Scenario
 from stylesim.simulation.sumo.engine import Engine
-from stylesim.style import STYLE_CLASSES
-
-CODES = {name: code for code, name in enumerate(STYLE_CLASSES)}
-NEAR_M = 25.0  # farther centres cannot touch: half the diagonals of the longest vehicles
 
 
 class SumoEpisode:
@@ -29,7 +25,6 @@ class SumoEpisode:
     ) -> None:
         self._config = config
         self._crowd = SumoCrowd(engine, scenario, population, seed=seed, extra_s=config.duration_s)
-        self._numbers: dict[str, int] = {EGO: 0}
         self._collided = False
         self._pose = np.zeros(7)
         self._crowd.run_until(scenario.warm_up_s)
@@ -61,34 +56,37 @@ class SumoEpisode:
         sumo = self._crowd.sumo
         self._ego.before_step(command)
         self._crowd.step()
-        arrived = EGO not in sumo.vehicle.getIDList()
+        arrived = EGO in sumo.simulation.getArrivedIDList()
         self._ego.after_step(arrived=arrived)
         if not arrived:
             self._pose = poses_of(sumo, [EGO], np.array([[LENGTH_M, WIDTH_M]]))[0]
-            self._collided = EGO in self._crowd.collided or self._overlaps()
+            self._collided = EGO in self._crowd.foreign_collided or self._overlaps()
 
     def _overlaps(self) -> bool:
         """Does the ego's box overlap another's (SUMO looks along lanes only)."""
         others = self._crowd.poses()
-        near = others[np.hypot(*(others[:, :2] - self._pose[:2]).T) < NEAR_M]
+        apart = np.hypot(others[:, 0] - self._pose[0], others[:, 1] - self._pose[1])
+        near = others[apart < (others[:, 5] + others[:, 6] + LENGTH_M + WIDTH_M) / 2]  # a bound of the half diagonals
         if not len(near):
             return False
         mine = box_corners(self._pose[None, :2], self._pose[None, 4], self._pose[None, 5:7])
         return bool(boxes_overlap(mine, box_corners(near[:, :2], near[:, 4], near[:, 5:7])).any())
 
     def _snapshot(self) -> Snapshot:
-        crowd, names = self._crowd, self._crowd.names
-        for name in names:
-            self._numbers.setdefault(name, len(self._numbers))
-        styles = [crowd.style(name) for name in names]
+        crowd, rows = self._crowd, self._crowd.rows
         return Snapshot(
             ego=self._ego.state(collided=self._collided),
-            number=np.array([0, *(self._numbers[name] for name in names)], np.int32),
+            number=np.concatenate([[0], rows + 1]).astype(np.int32),
             pose=np.concatenate([self._pose[None], crowd.poses()]),
-            style=np.array([-1, *(CODES[style.name] for style in styles)], np.int8),
-            knob=np.array([0.0, *(style.aggressiveness for style in styles)], np.float32),
-            decision=np.array([NO_DECISION, *map(crowd.decided, names)], np.int8),
-            ran_red=np.array([False, *(name in crowd.ran_red for name in names)], bool),
-            crashed=np.array([self._collided, *(name in crowd.collided for name in names)], bool),
+            style=_led_by(-1, crowd.style[rows]),
+            knob=_led_by(0.0, crowd.knob[rows]),
+            decision=_led_by(NO_DECISION, crowd.decision[rows]),
+            ran_red=_led_by(False, crowd.ran_red[rows]),
+            crashed=_led_by(self._collided, crowd.collided[rows]),
             lights=np.array(crowd.lights(), np.int8),
         )
+
+
+def _led_by(first: float, rest: np.ndarray) -> np.ndarray:
+    """An array of the ego's value and the others'."""
+    return np.concatenate([np.array([first], rest.dtype), rest])

@@ -17,7 +17,7 @@ class YellowLightEnv(DrivingEnv):
 
     backend: ClassVar[str] = "sumo"
     default_scenario: ClassVar[str] = "yellow_light"
-    defaults: ClassVar[dict[str, Any]] = {"period_s": 0.2, "max_speed_mps": 25.0}
+    defaults: ClassVar[dict[str, Any]] = {"period_s": 0.1, "max_speed_mps": 25.0}
 
     def _make_world(self) -> World:
         return SumoWorld(self.config)
