@@ -17,10 +17,11 @@ def local_polynomial(values, run, operators, least, out):
     """Fit a polynomial around every sample of every run and write its value and derivatives.
 
     values [agent time channel], run [agent time] (an unbroken run shares a number, -1: nothing there),
-    operators [run length - least, place in the window, derivative, sample], out [agent time channel derivative].
+    operators [run length - least, place in the window, sample, derivative], out [agent time channel derivative].
     """
     agents, frames = run.shape
     taps = operators.shape[1]
+    total = np.empty(4)
     for agent in range(agents):
         start = 0
         while start < frames:
@@ -34,16 +35,38 @@ def local_polynomial(values, run, operators, least, out):
                 width = min(stop - start, taps)
                 for frame in range(start, stop):
                     first = max(start, min(frame - width // 2, stop - width))
-                    operator = operators[width - least, frame - first]
                     for channel in range(values.shape[2]):
                         # Relative to the sample itself, so that a far origin costs no digits.
                         base = np.float64(values[agent, frame, channel])
-                        for order in range(operator.shape[0]):
-                            total = 0.0
-                            for i in range(width):
-                                total += operator[order, i] * (values[agent, first + i, channel] - base)
-                            out[agent, frame, channel, order] = total
-                        out[agent, frame, channel, 0] += base
+                        total[:] = 0.0
+                        for i in range(width):
+                            away = values[agent, first + i, channel] - base
+                            for order in range(4):
+                                total[order] += operators[width - least, frame - first, i, order] * away
+                        out[agent, frame, channel, 0] = base + total[0]
+                        for order in range(1, 4):
+                            out[agent, frame, channel, order] = total[order]
+            start = stop
+
+
+@njit(cache=True, nogil=True)
+@no_type_check
+def left_its_place(position, run, more_than, moved):
+    """Mark every frame of a run in which the agent came further than `more_than` from where the run began."""
+    agents, frames = run.shape
+    for agent in range(agents):
+        start = 0
+        while start < frames:
+            stop, gone = start + 1, False
+            if run[agent, start] >= 0:
+                while stop < frames and (run[agent, stop] == run[agent, start] or run[agent, stop] < 0):
+                    if run[agent, stop] >= 0 and not gone:
+                        dx = np.float64(position[agent, stop, 0]) - position[agent, start, 0]
+                        dy = np.float64(position[agent, stop, 1]) - position[agent, start, 1]
+                        gone = dx * dx + dy * dy > more_than * more_than
+                    stop += 1
+                for frame in range(start, stop):
+                    moved[agent, frame] = gone and run[agent, frame] >= 0
             start = stop
 
 
@@ -80,33 +103,37 @@ def closing_sums(point, direction, speed, is_ego, is_neighbour, radius, least_co
     agents, frames = speed.shape
     index = np.empty(agents, np.int64)
     key = np.empty(agents)
+    # A frame's vehicles side by side in memory: x, y, direction x, y, speed. The pairs are then read from the cache.
+    here = np.empty((agents, 5))
+    ego, other = np.empty(agents, np.bool_), np.empty(agents, np.bool_)
+    total, number = np.empty(agents), np.empty(agents, np.int32)
     present = is_ego | is_neighbour
     for frame in range(frames):
         n = ordered_frame(point, present, frame, index, key)
         for i in range(n):
             a = index[i]
-            ax, ay = point[a, frame, 0], point[a, frame, 1]
+            here[i, 0], here[i, 1] = point[a, frame, 0], point[a, frame, 1]
+            here[i, 2], here[i, 3], here[i, 4] = direction[a, frame, 0], direction[a, frame, 1], speed[a, frame]
+            ego[i], other[i] = is_ego[a, frame], is_neighbour[a, frame]
+            total[i], number[i] = 0.0, 0
+        for i in range(n):
+            x, y, ux, uy, v = here[i, 0], here[i, 1], here[i, 2], here[i, 3], here[i, 4]
             for j in range(i + 1, n):
                 if key[j] - key[i] > radius:
                     break
-                b = index[j]
-                dx, dy = point[b, frame, 0] - ax, point[b, frame, 1] - ay
+                dx, dy = here[j, 0] - x, here[j, 1] - y
                 squared = dx * dx + dy * dy
-                if squared > radius * radius:
+                if squared > radius * radius or ux * here[j, 2] + uy * here[j, 3] < least_cosine:
                     continue
-                cosine = (
-                    direction[a, frame, 0] * direction[b, frame, 0] + direction[a, frame, 1] * direction[b, frame, 1]
-                )
-                if cosine < least_cosine:
-                    continue
-                closeness = 1.0 / max(np.sqrt(squared), floor)
-                difference = (speed[a, frame] - speed[b, frame]) * closeness
-                if is_ego[a, frame] and is_neighbour[b, frame]:
-                    closing[a, frame] += max(0.0, difference)
-                    count[a, frame] += 1
-                if is_ego[b, frame] and is_neighbour[a, frame]:
-                    closing[b, frame] += max(0.0, -difference)
-                    count[b, frame] += 1
+                difference = (v - here[j, 4]) / max(np.sqrt(squared), floor)
+                if ego[i] and other[j]:
+                    total[i] += max(0.0, difference)
+                    number[i] += 1
+                if ego[j] and other[i]:
+                    total[j] += max(0.0, -difference)
+                    number[j] += 1
+        for i in range(n):
+            closing[index[i], frame], count[index[i], frame] = total[i], number[i]
 
 
 @njit(cache=True, nogil=True)

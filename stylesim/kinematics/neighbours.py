@@ -26,18 +26,11 @@ def displaced(
     Tells parked vehicles from traffic [ours: 1 m in the window]. `run` as in `smoothing.derivatives`; runs of one
     number that are interrupted count together.
     """
-    agent, frame = np.nonzero(run >= 0)
-    if not len(agent):
-        return np.zeros(run.shape, bool)
-    number = agent * (int(run.max()) + 1) + run[agent, frame]
-    first = np.concatenate([[True], number[1:] != number[:-1]])
-    group = np.cumsum(first) - 1
-    place = position_m[agent, frame].astype(np.float64)
-    away = np.hypot(*(place - place[np.flatnonzero(first)[group]]).T)
-    moved = np.maximum.reduceat(away, np.flatnonzero(first)) > more_than_m
-    result = np.zeros(run.shape, bool)
-    result[agent, frame] = moved[group]
-    return result
+    from stylesim.kinematics.kernels import left_its_place
+
+    moved = np.zeros(run.shape, bool)
+    left_its_place(position_m, run, more_than_m, moved)
+    return moved
 
 
 def closing_on_neighbours(

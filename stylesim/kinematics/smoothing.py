@@ -43,22 +43,22 @@ class Smoother:
 
 
 @lru_cache(maxsize=16)
-def operators(smoother: Smoother, dt_s: float) -> Float64[np.ndarray, "length place derivative sample"]:
+def operators(smoother: Smoother, dt_s: float) -> Float64[np.ndarray, "length place sample derivative"]:
     """What turns the samples of a window into value and first three derivatives at each of its places.
 
     The first axis counts run lengths from `least_samples` to the full window; shorter ones are padded with 0.
     """
     least, taps = smoother.least_samples, smoother.taps(dt_s)
-    result = np.zeros((taps - least + 1, taps, 4, taps))
+    result = np.zeros((taps - least + 1, taps, taps, 4))
     factorial = np.cumprod(np.maximum(np.arange(smoother.order + 1), 1))
     for length in range(least, taps + 1):
         for place in range(length):
             at = np.arange(length) - place
-            # Column k of the pseudo-inverse's rows is the k-th Taylor coefficient at `place`, in samples.
+            # Row k of the pseudo-inverse gives the k-th Taylor coefficient at `place`, with time in samples.
             taylor = np.linalg.pinv(np.vander(at, smoother.order + 1, increasing=True).astype(np.float64))
             for derivative in range(4):
                 scale = factorial[derivative] / dt_s**derivative
-                result[length - least, place, derivative, :length] = taylor[derivative] * scale
+                result[length - least, place, :length, derivative] = taylor[derivative] * scale
     result.flags.writeable = False
     return result
 

@@ -10,7 +10,7 @@ from jaxtyping import Bool, Float, Float64
 from stylesim.kinematics import Motion
 from stylesim.labelers.cuts import Cut
 from stylesim.labelers.lanes import LaneMatch
-from stylesim.labelers.reduce import Groups
+from stylesim.labelers.reduce import moments
 from stylesim.labelers.roadindex import RoadIndex
 
 CONTEXTS = ("non_highway", "highway")
@@ -34,7 +34,6 @@ def highway_share(
     Limit >= 80 km/h and no junction within 150 m; where the limit is unknown, the window's median traffic speed
     >= 18 m/s: the median over its frames of the median speed of the motor vehicles that drive then.
     """
-    groups = Groups(cut)
     rule = np.full(cut.window.shape, np.nan)
     if found is not None and index is not None:
         rule = _by_limit(found, index)
@@ -44,7 +43,7 @@ def highway_share(
         fast = _traffic(motion, is_vehicle, cut) >= HIGHWAY_TRAFFIC_MPS
         agent, frame = np.nonzero(unknown)
         rule[agent, frame] = fast[agent, cut.window[agent, frame]]
-    return groups.of(rule).mean()
+    return moments(rule, cut).mean
 
 
 def _by_limit(found: LaneMatch, index: RoadIndex) -> Float64[np.ndarray, "agent time"]:

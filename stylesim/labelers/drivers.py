@@ -93,4 +93,11 @@ def driver_samples(
         for length, table in zip(lengths_s, tables, strict=True):
             steps = max(1, round(length / scene.tracks.dt_s))
             table.add(scene, track_rows(scene, options, length_steps=steps))
-    return [table.sample() for table in tables]
+    return [_driving(t.sample(), options.parked_within_m / s) for t, s in zip(tables, lengths_s, strict=True)]
+
+
+def _driving(sample: DriverSample, slowest_mps: float) -> DriverSample:
+    """Without the parked: who moves less than the options allow a parked vehicle is no driver to learn from [ours]."""
+    keep = ~(sample.value[:, FEATURES.index("v_avg")] <= slowest_mps)
+    names = tuple(name for name, kept in zip(sample.name, keep, strict=True) if kept)
+    return DriverSample(name=names, value=sample.value[keep], highway=sample.highway[keep])

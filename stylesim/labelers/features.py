@@ -14,7 +14,7 @@ from stylesim.labelers.context import highway_share
 from stylesim.labelers.cuts import Cut
 from stylesim.labelers.lanes import LaneMatch
 from stylesim.labelers.options import FeatureOptions
-from stylesim.labelers.reduce import Groups
+from stylesim.labelers.reduce import frame_count, moments
 from stylesim.labelers.roadindex import RoadIndex, build
 from stylesim.labels import LabelFlag
 from stylesim.road import Road
@@ -95,15 +95,14 @@ def _features(tracks: Tracks, road: Road | None, cut: Cut, options: FeatureOptio
     moved = motion(tracks.position_m, tracks.heading_rad, cut.run, dt_s=tracks.dt_s, smoother=options.smoother)
     vehicle = tracks.valid & tracks.is_motor[:, None]
     found = None if index is None else lanes.match(tracks, index, vehicle)
-    groups = Groups(cut)
-    flags = np.zeros(groups.shape, np.int32)
-    columns = _kinematic(moved, groups)
-    columns["s_center"] = _centre(tracks, found, cut, groups, flags, options)
-    columns["v_nei"] = _neighbours(tracks, moved, vehicle, cut, groups, flags, options)
+    frames = frame_count(tracks.valid, cut).astype(np.int32)
+    flags = np.zeros(frames.shape, np.int32)
+    columns = _kinematic(moved, cut)
+    columns["s_center"] = _centre(tracks, found, cut, frames, flags, options)
+    columns["v_nei"] = _neighbours(tracks, moved, vehicle, cut, flags, options)
     follow = lanes.leaders(tracks, moved, found, index, is_vehicle=vehicle, options=options)
-    has_leader = groups.count(follow.leader >= 0) > 0
-    columns["s_front"] = np.where(has_leader, groups.of(follow.gap_m).mean(), options.leader_range_m)
-    frames = groups.count(tracks.valid).astype(np.int32)
+    has_leader = frame_count(follow.leader >= 0, cut) > 0
+    columns["s_front"] = np.where(has_leader, moments(follow.gap_m, cut).mean, options.leader_range_m)
     columns["s_front"][frames == 0] = np.nan
     flags[~has_leader & (frames > 0)] |= LabelFlag.NO_LEADER
     flags[columns["max_abs_acceleration"] > IMPLAUSIBLE_MPS2] |= LabelFlag.IMPLAUSIBLE
@@ -118,22 +117,21 @@ def _features(tracks: Tracks, road: Road | None, cut: Cut, options: FeatureOptio
     return result
 
 
-def _kinematic(moved: Motion, groups: Groups) -> dict[str, Float64[np.ndarray, "agent window"]]:
-    speed, acceleration = groups.of(moved.speed_mps), groups.of(moved.acceleration_mps2)
-    jerk = groups.of(moved.jerk_mps3)
-    var_jerk = jerk.variance()
+def _kinematic(moved: Motion, cut: Cut) -> dict[str, Float64[np.ndarray, "agent window"]]:
+    speed, acceleration = moments(moved.speed_mps, cut), moments(moved.acceleration_mps2, cut)
+    jerk = moments(moved.jerk_mps3, cut)
     return {
-        "v_avg": speed.mean(),
-        "j_l": groups.of(np.abs(moved.jerk_mps3)).mean(),
-        "mean_speed": speed.mean(),
-        "max_speed": speed.maximum(),
-        "var_speed": speed.variance(),
-        "mean_acceleration": acceleration.mean(),
-        "max_abs_acceleration": groups.of(np.abs(moved.acceleration_mps2)).maximum(),
-        "var_acceleration": acceleration.variance(),
-        "mean_jerk": jerk.mean(),
-        "var_jerk": var_jerk,
-        "std_jerk": np.sqrt(var_jerk),
+        "v_avg": speed.mean,
+        "j_l": moments(np.abs(moved.jerk_mps3), cut).mean,
+        "mean_speed": speed.mean,
+        "max_speed": speed.maximum,
+        "var_speed": speed.variance,
+        "mean_acceleration": acceleration.mean,
+        "max_abs_acceleration": moments(np.abs(moved.acceleration_mps2), cut).maximum,
+        "var_acceleration": acceleration.variance,
+        "mean_jerk": jerk.mean,
+        "var_jerk": jerk.variance,
+        "std_jerk": np.sqrt(jerk.variance),
     }
 
 
@@ -141,19 +139,18 @@ def _centre(
     tracks: Tracks,
     found: LaneMatch | None,
     cut: Cut,
-    groups: Groups,
+    frames: Int32[np.ndarray, "agent window"],
     flags: Int32[np.ndarray, "agent window"],
     options: FeatureOptions,
 ) -> Float64[np.ndarray, "agent window"]:
     """s_center, the mean of |d| (mu + |dd/dt|) over the frames whose lane is known."""
-    frames = groups.count(tracks.valid)
     if found is None:
         flags[frames > 0] |= LabelFlag.NO_LANE
-        return np.full(groups.shape, np.nan)
-    rate = groups.of(lanes.straying(found, cut.run, tracks.dt_s, options).rate)
+        return np.full(frames.shape, np.nan)
+    rate = moments(lanes.straying(found, cut.run, tracks.dt_s, options).rate, cut)
     missing = rate.count < LEAST_LANE_SHARE * frames
     flags[missing] |= LabelFlag.NO_LANE
-    return np.where(missing, np.nan, rate.mean())
+    return np.where(missing, np.nan, rate.mean)
 
 
 def _neighbours(
@@ -161,7 +158,6 @@ def _neighbours(
     moved: Motion,
     vehicle: Bool[np.ndarray, "agent time"],
     cut: Cut,
-    groups: Groups,
     flags: Int32[np.ndarray, "agent window"],
     options: FeatureOptions,
 ) -> Float64[np.ndarray, "agent window"]:
@@ -176,6 +172,6 @@ def _neighbours(
         heading_within_rad=float(np.pi if everyone else np.radians(options.neighbour_heading_deg)),
         distance_floor_m=options.distance_floor_m,
     )
-    alone = groups.count(closing.count > 0) == 0
-    flags[alone & (groups.count(tracks.valid) > 0)] |= LabelFlag.NO_NEIGHBOURS
-    return groups.of(np.where(moved.known, closing.rate_per_s, np.nan)).mean()
+    alone = frame_count(closing.count > 0, cut) == 0
+    flags[alone & (frame_count(tracks.valid, cut) > 0)] |= LabelFlag.NO_NEIGHBOURS
+    return moments(np.where(moved.known, closing.rate_per_s, np.nan), cut).mean

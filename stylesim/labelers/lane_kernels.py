@@ -97,7 +97,8 @@ def lane_leaders(
     agents, frames, places = lane.shape
     on_lane = np.empty(agents * places, np.int64)
     who = np.empty(agents * places, np.int64)
-    where = np.empty(agents * places)
+    where, key = np.empty(agents * places), np.empty(agents * places)
+    longest = 1.0 + (length.max() if len(length) else 0.0)
     lanes = len(length)
     begin = np.zeros(lanes + 1, np.int64)
     for frame in range(frames):
@@ -109,14 +110,14 @@ def lane_leaders(
                 here = lane[agent, frame, k]
                 if here >= 0 and (k == 0 or abs(offset[agent, frame, k]) <= reach[here] - tolerance):
                     on_lane[count], who[count], where[count] = here, agent, along[agent, frame, k]
+                    key[count] = here * longest + where[count]  # by lane, then by the way along it
                     count += 1
         begin[:] = 0
         for i in range(count):
             begin[on_lane[i] + 1] += 1
         for i in range(lanes):
             begin[i + 1] += begin[i]
-        order = np.argsort(where[:count], kind="mergesort")
-        order = order[np.argsort(on_lane[:count][order], kind="mergesort")]
+        order = np.argsort(key[:count])
         for ego in range(agents):
             home = lane[ego, frame, 0]
             if home < 0 or not is_ego[ego, frame]:
