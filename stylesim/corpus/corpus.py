@@ -14,6 +14,7 @@ from stylesim.corpus.files import inside
 from stylesim.corpus.label_store import has_labels, read_labels, write_labels
 from stylesim.corpus.roads import read_road
 from stylesim.corpus.tables import part_tables, read_parquet, tracks_and_signals
+from stylesim.corpus.weight_store import read_weights, write_weights
 from stylesim.corpus.writer import FORMAT, SCENE_SCHEMA, SCHEMA_VERSION
 from stylesim.errors import CorpusError, InputError, nearest
 from stylesim.labels import StyleLabels
@@ -168,7 +169,8 @@ class Corpus:
 
     def weights(self) -> dict[tuple[str, str], float]:
         """Sampling weight of each (scene_id, agent_id); empty if the corpus has none."""
-        if "weights.parquet" not in self.manifest["files"]:
-            return {}
-        table = read_parquet(self.path / "weights.parquet")
-        return {(row[0], row[1]): row[2] for row in table.select("scene_id", "agent_id", "weight").iter_rows()}
+        return read_weights(self.path, self.manifest)
+
+    def write_weights(self, weights: Mapping[tuple[str, str], float], *, by: str) -> None:
+        """Write sampling weights as a new file beside the corpus; they take the place of those made with it."""
+        write_weights(self.path, weights, by=by, fingerprint=self.fingerprint)

@@ -132,10 +132,9 @@ def _scene(folder: Path, split: str) -> Scene:
 def _read(file: Path) -> pl.DataFrame:
     try:
         table = pl.read_parquet(file)
-    except (OSError, pl.exceptions.PolarsError) as error:
-        raise InputError(
-            f"{file} is damaged or no Parquet file ({str(error).splitlines()[0]}); get it again"
-        ) from error
+    except (OSError, pl.exceptions.PolarsError, pl.exceptions.PanicException) as error:
+        reason = (str(error).splitlines() or ["unreadable"])[0]
+        raise InputError(f"{file} is damaged or no Parquet file ({reason}); get it again") from error
     absent = [name for name in _COLUMNS if name not in table.columns]
     if absent:
         raise InputError(f"{file} lacks the columns {', '.join(absent)}; it is no scenario of Argoverse 2")

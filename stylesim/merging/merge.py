@@ -1,0 +1,208 @@
+"""`merge`: several corpora into one, on one clock, split without leakage, balanced by weights."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Callable, Container, Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from stylesim.corpus import Corpus, CorpusWriter
+from stylesim.errors import InputError, unknown
+from stylesim.merging.balance import ROW, check_balance, equal_shares, require_labels, style_groups
+from stylesim.merging.carry import carried_kinds, carried_labels
+from stylesim.merging.clock import COMMON_DT_S, on_common_clock
+from stylesim.merging.noise import NoiseModel, with_noise
+from stylesim.merging.noise_fit import recorded_sources, train_noise
+from stylesim.merging.splits import SplitPlan, plan_splits
+from stylesim.merging.time_blocks import Sight, one_block_each
+from stylesim.randomness import stream
+from stylesim.scene import Scene
+from stylesim.windows import WindowSpec
+
+SceneKey = tuple[int, str]
+Progress = Callable[[int, int], None]
+
+
+@dataclass(frozen=True)
+class _Plan:
+    """Everything that is decided before the first scene is written."""
+
+    corpora: tuple[Corpus, ...]
+    splits: SplitPlan
+    new_id: Mapping[SceneKey, str]  # of the scenes that are kept
+    dropped: Mapping[SceneKey, Mapping[str, int]]  # agents taken out of a scene, with their steps
+    noise: tuple[NoiseModel, ...]
+    seed: int
+
+
+def merge(
+    corpora: Sequence[Corpus],
+    *,
+    balance: str = "none",
+    split: tuple[float, float, float] = (0.8, 0.1, 0.1),
+    seed: int,
+    out: str | Path,
+    noise: str | None = None,
+    spec: WindowSpec | None = None,
+    resume: bool = False,
+    progress: Progress | None = None,
+) -> Corpus:
+    """Merge corpora into a new one at `out`; equal inputs, options and seed give equal bytes.
+
+    One clock of 0.1 s (`clock`). Splits by unit, official ones respected, sources of fewer than three units in
+    time blocks with a guard gap of history + future of `spec` (`splits`). `balance`: sampling weights of the
+    training split by measured "tdbm" style or by "source"; nothing is copied. `noise="fit"` makes simulated tracks
+    as noisy as the recorded ones of the training split (`noise`); labels of the inputs do not hold any more then,
+    so label the result and call `balance`. Without it, labels made by one labeller are taken over.
+
+    Raises InputError for no corpus, one given twice, bad shares, missing labels (naming the command to run), noise
+    without recorded tracks. Counted: scenes in guard gaps, agents taken out of a second block, labels left behind.
+    """
+    check_balance(balance)
+    inputs = _checked(corpora)
+    if noise not in (None, "fit"):
+        raise unknown("noise", str(noise), ("fit",))
+    changed = noise is not None or any(abs(i.dt_s - COMMON_DT_S) > 1e-6 for corpus in inputs for i in corpus.info)
+    kept, left = _labels_to_carry(inputs, balance, changed=changed, noise=noise)
+    plan = _plan(inputs, split=split, seed=seed, noise=noise, spec=spec or WindowSpec())
+    weights = _weights(plan, balance)
+    said = _said(plan, balance, split, left)
+    with CorpusWriter(out, source="merge", configuration=said, seed=seed, resume=resume) as writer:
+        for done, (key, scene) in enumerate(_scenes(plan), start=1):
+            writer.add(scene, split=plan.splits.split[key])
+            if progress is not None:
+                progress(done, len(plan.new_id))
+        merged = writer.finish(counts=_counts(plan), weights=weights)
+    for method, span in kept:
+        merged.write_labels(carried_labels(inputs, method, span, new_id=plan.new_id, dropped=plan.dropped))
+    return merged
+
+
+def _checked(corpora: Sequence[Corpus]) -> tuple[Corpus, ...]:
+    if not corpora:
+        raise InputError("there is no corpus to merge; name at least one")
+    seen: dict[str, Path] = {}
+    for corpus in corpora:
+        if corpus.fingerprint in seen:
+            raise InputError(f"{corpus.path} is the same corpus as {seen[corpus.fingerprint]}; name it once")
+        seen[corpus.fingerprint] = corpus.path
+    return tuple(corpora)
+
+
+def _labels_to_carry(
+    inputs: Sequence[Corpus], balance: str, *, changed: bool, noise: str | None
+) -> tuple[list[tuple[str, str]], list[str]]:
+    kept, left = carried_kinds(inputs, tracks_changed=changed)
+    if balance in ("none", "source"):
+        return kept, left
+    if changed:
+        why = "noise" if noise else "resampling"
+        raise InputError(
+            f"{why} makes the labels of the inputs void: merge with balance none, then `stylesim label` the result and "
+            f"`stylesim balance` it by {balance}"
+        )
+    for corpus in inputs:
+        require_labels(corpus, balance)
+    if (balance, "track") not in kept:
+        raise InputError(f"cannot balance by {balance}: {'; '.join(left)}; label all inputs with the same labeller")
+    return kept, left
+
+
+def _plan(
+    inputs: tuple[Corpus, ...],
+    *,
+    split: tuple[float, float, float],
+    seed: int,
+    noise: str | None,
+    spec: WindowSpec,
+) -> _Plan:
+    infos = [(number, info) for number, corpus in enumerate(inputs) for info in corpus.info]
+    splits = plan_splits(infos, shares=split, seed=seed, guard_s=spec.history_s + spec.future_s)
+    often = Counter(info.scene_id for _, info in infos)
+    new_id = {
+        (number, info.scene_id): info.scene_id if often[info.scene_id] == 1 else f"c{number}-{info.scene_id}"
+        for number, info in infos
+        if (number, info.scene_id) in splits.split
+    }
+    models = train_noise(inputs, splits) if noise else ()
+    return _Plan(inputs, splits, new_id, _second_blocks(inputs, splits), models, seed)
+
+
+def _second_blocks(inputs: Sequence[Corpus], splits: SplitPlan) -> dict[SceneKey, dict[str, int]]:
+    """The agents to take out of scenes, because they belong to another block of the same recording."""
+    sights = {key: Sight.of(scene) for key, scene in _keyed(inputs, splits.split) if scene.source in splits.within}
+    home = one_block_each((splits.split[key], sight) for key, sight in sights.items())
+    dropped = {}
+    for key, sight in sights.items():
+        block = splits.split[key]
+        strangers = {
+            a: n for a, n in sight.frames.items() if home.get((sight.source, sight.unit_id, a), block) != block
+        }
+        if strangers:
+            dropped[key] = strangers
+    return dropped
+
+
+def _keyed(inputs: Sequence[Corpus], chosen: Container[SceneKey]) -> Iterator[tuple[SceneKey, Scene]]:
+    for number, corpus in enumerate(inputs):
+        for scene in corpus.with_info(i for i in corpus.info if (number, i.scene_id) in chosen):
+            yield (number, scene.scene_id), scene
+
+
+def _scenes(plan: _Plan) -> Iterator[tuple[SceneKey, Scene]]:
+    """The scenes as they are written."""
+    recorded = recorded_sources()
+    for key, scene in _keyed(plan.corpora, plan.new_id):
+        strangers = plan.dropped.get(key, {})
+        if strangers:
+            keep = np.array([agent not in strangers for agent in scene.tracks.agent_id])
+            scene = replace(scene, tracks=scene.tracks.select(keep))
+        scene = on_common_clock(scene)
+        if plan.noise and scene.source not in recorded:
+            number = stream(plan.seed, 0, scene.unit_id, "sensor").integers(len(plan.noise))
+            scene = with_noise(scene, plan.noise[int(number)], seed=plan.seed)
+        yield key, replace(scene, scene_id=plan.new_id[key])
+
+
+def _weights(plan: _Plan, balance: str) -> dict[ROW, float]:
+    if balance == "none":
+        return {}
+    train = {key for key in plan.new_id if plan.splits.split[key] == "train"}
+    group: dict[ROW, str] = {}
+    if balance == "source":
+        for key, scene in _keyed(plan.corpora, train):
+            for agent, motor in zip(scene.tracks.agent_id, scene.tracks.is_motor.tolist(), strict=True):
+                if motor and agent not in plan.dropped.get(key, {}):
+                    group[plan.new_id[key], agent] = scene.source
+    else:
+        wanted = {plan.new_id[key] for key in train}
+        for labels in carried_labels(plan.corpora, balance, "track", new_id=plan.new_id, dropped=plan.dropped):
+            group |= {row: name for row, name in style_groups(labels).items() if row[0] in wanted}
+    return equal_shares(group)
+
+
+def _said(plan: _Plan, balance: str, split: tuple[float, float, float], left: list[str]) -> dict[str, Any]:
+    return {
+        "inputs": [corpus.fingerprint for corpus in plan.corpora],
+        "balance": balance,
+        "split": list(split),
+        "split_rule": plan.splits.rule,
+        "noise": [model.to_dict() for model in plan.noise],
+        "labels_left_behind": left,
+    }
+
+
+def _counts(plan: _Plan) -> dict[str, int]:
+    """Agent-steps in = agent-steps out (before any resampling) + those in guard gaps + those taken out."""
+    infos = [((number, info.scene_id), info) for number, corpus in enumerate(plan.corpora) for info in corpus.info]
+    return {
+        "scenes_in_guard_gaps": len(plan.splits.guarded),
+        "tracks_taken_out_of_a_second_block": sum(len(agents) for agents in plan.dropped.values()),
+        "steps_in": sum(info.n_steps for _, info in infos),
+        "steps_in_guard_gaps": sum(info.n_steps for key, info in infos if key in plan.splits.guarded),
+        "steps_taken_out": sum(sum(agents.values()) for agents in plan.dropped.values()),
+    }
