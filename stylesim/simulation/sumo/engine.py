@@ -26,6 +26,8 @@ class VehicleApi(Protocol):
     def getIDCount(self) -> int: ...  # noqa: D102, N802
     def getPosition(self, vehID: str) -> tuple[float, float]: ...  # noqa: D102, N802
     def getLateralLanePosition(self, vehID: str) -> float: ...  # noqa: D102, N802
+    def getLanePosition(self, vehID: str) -> float: ...  # noqa: D102, N802
+    def setLaneChangeMode(self, vehID: str, laneChangeMode: int) -> None: ...  # noqa: D102, N802
     def getAngle(self, vehID: str) -> float: ...  # noqa: D102, N802
     def getNextTLS(self, vehID: str) -> Sequence[tuple[str, int, float, str]]: ...  # noqa: D102, N802
     def getSpeed(self, vehID: str) -> float: ...  # noqa: D102, N802
@@ -57,6 +59,12 @@ class TrafficLightApi(Protocol):
     def getNextSwitch(self, tlsID: str) -> float: ...  # noqa: D102, N802
 
 
+class LaneApi(Protocol):
+    """The part of `libsumo.lane` used here."""
+
+    def getLastStepVehicleIDs(self, laneID: str) -> Sequence[str]: ...  # noqa: D102, N802
+
+
 class SumoApi(Protocol):
     """The part of libsumo used here."""
 
@@ -64,6 +72,7 @@ class SumoApi(Protocol):
     vehicletype: VehicleTypeApi
     simulation: SimulationApi
     trafficlight: TrafficLightApi
+    lane: LaneApi
 
     def start(self, cmd: list[str]) -> Any: ...  # noqa: D102
     def load(self, args: list[str]) -> Any: ...  # noqa: D102

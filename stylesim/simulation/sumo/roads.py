@@ -31,6 +31,7 @@ class RoadNetwork:
 
     road: Road
     links: tuple[SignalLink, ...]
+    length_m: dict[str, float]  # of each lane, as SUMO counts it
     edges: tuple[str, ...]  # those between junctions
 
     def controlled_lanes(self) -> tuple[str, ...]:
@@ -70,8 +71,9 @@ def read_network(path: Path) -> RoadNetwork:
     controlled = {link.lane for link in links}
     lanes = [lane for edge in edges for lane in _lanes(edge, successors, controlled)]
     outer = tuple(e.attrib["id"] for e in edges if e.get("function") != "internal")
+    length = {lane.attrib["id"]: float(lane.attrib["length"]) for edge in edges for lane in edge.findall("lane")}
     ordered = tuple(sorted(links, key=lambda link: (link.signal, link.index)))
-    return RoadNetwork(Road(tuple(lanes)), ordered, outer)
+    return RoadNetwork(Road(tuple(lanes)), ordered, length, outer)
 
 
 def _lanes(edge: ET.Element, successors: dict[str, list[str]], controlled: set[str]) -> list[Lane]:

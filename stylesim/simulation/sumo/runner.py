@@ -12,6 +12,7 @@ from stylesim.simulation.sumo.engine import Engine
 from stylesim.simulation.sumo.episode import DT_S, EpisodeFiles, prepare_episode, sumo_options
 from stylesim.simulation.sumo.recorder import RawLog, Recorder
 from stylesim.simulation.sumo.scenes import scene_of
+from stylesim.simulation.sumo.stopzone import StopZone
 from stylesim.simulation.sumo.yellow import DecisionEvent, YellowController
 
 LEAD_S = 4.0  # recorded before the first logged frame, because bodies follow the path behind them
@@ -46,12 +47,13 @@ class SumoBackend:
         plan = files.options.signal
         first = max(0, round((files.warm_up_s - LEAD_S) / DT_S))
         recorder = Recorder(engine.sumo, signal=plan.junction if plan else "", first_step=first)
-        controller = YellowController(engine.sumo, files)
+        yellow, zone = YellowController(engine.sumo, files), StopZone(engine.sumo, files)
         for step in range(round(files.end_s / DT_S)):
-            controller.before_step(step)
+            yellow.before_step(step)
+            zone.before_step(step)
             engine.step()
             recorder.after_step(step)
-        return recorder.finish(), controller.events
+        return recorder.finish(), yellow.events
 
     def close(self) -> None:
         """Ends the simulation."""
