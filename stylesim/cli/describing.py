@@ -26,18 +26,18 @@ class What(StrEnum):
 def list_(what: What = typer.Argument(help="What to list.")) -> None:
     """List scenarios, populations, styles or data-set formats."""
     if what is What.scenarios:
-        rows = [(s.name, s.backend, f"{s.duration_s:g}", s.title) for s in map(load_scenario, scenarios())]
-        show_table("Scenarios", ("name", "backend", "seconds", "what it is"), rows)
+        listed = [(s.name, s.backend, f"{s.duration_s:g}", s.title) for s in map(load_scenario, scenarios())]
+        show_table("Scenarios", ("name", "backend", "seconds", "what it is"), listed)
     elif what is What.populations:
         loaded = [Population.load(name) for name in populations()]
         shares = [[p.name, *(f"{share:.2f}" for share in p.shares)] for p in loaded]
         show_table("Populations: share of each style", ("name", *STYLE_CLASSES), shares)
     elif what is What.styles:
         table = style_table()
-        rows = [[key, *(f"{getattr(table.parameters[key], c):g}" for c in STYLE_CLASSES)] for key in PHYSICAL_FIELDS]
-        show_table(
-            "Styles: parameters at the place of each class (units in the names)", ("parameter", *STYLE_CLASSES), rows
-        )
+        parameters = [
+            [key, *(f"{getattr(table.parameters[key], c):g}" for c in STYLE_CLASSES)] for key in PHYSICAL_FIELDS
+        ]
+        show_table("Styles: parameters at the place of each class", ("parameter", *STYLE_CLASSES), parameters)
     else:
         from stylesim.datasets.formats import FORMATS
 

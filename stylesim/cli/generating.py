@@ -44,9 +44,9 @@ def chosen_population(population: str | None, styles: str | None, reweight: str 
 def generate(
     scenario: list[str] = typer.Argument(help="Scenarios by name (see `stylesim list scenarios`) or by folder."),
     out: Path = typer.Option(..., "--out", help="Folder of the new corpus; must not exist."),
-    population: str = typer.Option(None, help="A population's name or YAML file.", show_default="tdbm_spectrum"),
-    styles: str = typer.Option(None, help="All shares, sum 1: aggressive=0.3,careful=0.7."),
-    reweight: str = typer.Option(None, help="Set some shares, scale the rest: aggressive=0.3."),
+    population: str | None = typer.Option(None, help="A population's name or YAML file.", show_default="tdbm_spectrum"),
+    styles: str | None = typer.Option(None, help="All shares, sum 1: aggressive=0.3,careful=0.7."),
+    reweight: str | None = typer.Option(None, help="Set some shares, scale the rest: aggressive=0.3."),
     episodes: int = typer.Option(10, min=1, help="Episodes per scenario."),
     seed: int = typer.Option(0, min=0, help="Same seed, same bytes."),
     workers: int = typer.Option(1, min=1, help="Simulations side by side, one process each."),

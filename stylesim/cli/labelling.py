@@ -30,7 +30,7 @@ def _shares(labels: StyleLabels) -> list[tuple[str, int, str]]:
 def label(
     corpus: Path = typer.Argument(help="A corpus."),
     method: Method = typer.Option(Method.tdbm, help="How to label."),
-    fit: Path = typer.Option(
+    fit: Path | None = typer.Option(
         None, help="Corpus to fit scaler or clusters on; without it the shipped reference (never the judged corpus)."
     ),
     window: float = typer.Option(WindowSpec().history_s, help="History in seconds of the window labels."),

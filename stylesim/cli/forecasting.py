@@ -1,0 +1,128 @@
+"""`train`, `evaluate`, `render`: forecasters, the report of how they do by style, and a picture of a scene."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from enum import StrEnum
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import typer
+
+from stylesim.cli.console import progress_bar, say, show_table
+from stylesim.errors import InputError
+
+if TYPE_CHECKING:
+    from stylesim.report.tables import Cell
+
+
+class Condition(StrEnum):
+    """What the forecaster is told of a driver's style (always from the history)."""
+
+    none = "none"
+    tdbm = "tdbm"
+    kdsc = "kdsc"
+
+
+class Fusion(StrEnum):
+    """Where the style enters the network."""
+
+    early = "early"
+    mid = "mid"
+    late = "late"
+
+
+def train(
+    corpus: Path = typer.Argument(help="A merged corpus (with splits)."),
+    out: Path = typer.Option(..., "--out", help="Folder of the new model; must not exist."),
+    condition: Condition = typer.Option(Condition.none, help="Condition on the style of the history."),
+    fusion: Fusion = typer.Option(Fusion.early, help="Where the style enters."),
+    size: str = typer.Option("tiny", help="tiny, small or base."),
+    epochs: int = typer.Option(20, min=1, help="At most this many epochs; stops early without progress."),
+    seed: int = typer.Option(0, min=0, help="Same seed, same weights (on one kind of machine)."),
+    resume: bool = typer.Option(False, help="Go on from an unfinished training of the same request."),
+) -> None:
+    """Train the forecaster, with or without style."""
+    from stylesim.corpus import Corpus
+    from stylesim.forecasting.training import train as run
+
+    with progress_bar(f"training {out.name}", "steps") as progress:
+        model = run(
+            Corpus(corpus),
+            condition=condition.value,
+            fusion=fusion.value,
+            size=size,
+            epochs=epochs,
+            seed=seed,
+            out=out,
+            resume=resume,
+            progress=progress,
+        )
+    rows = [
+        (r["epoch"], f"{r['train_loss']:.3f}", f"{r['val_loss']:.3f}", f"{r['val_min_fde_m']:.2f}")
+        for r in model.training_curve
+    ]
+    show_table("Training", ("epoch", "train loss", "val loss", "val minFDE (m)"), rows)
+    say(f"{out}")
+
+
+def evaluate(
+    forecaster: list[str] = typer.Argument(help="Model folders or baselines (constant_velocity, …), then the corpus."),
+    by: str = typer.Option("tdbm", help="Strata: tdbm, kdsc, scenario, source, commanded, …; comma-separated."),
+    split: str = typer.Option("test", help="Split to evaluate; 'all' for the whole corpus."),
+    seed: int = typer.Option(0, min=0, help="Of the bootstrap."),
+    out: Path = typer.Option(..., "--out", help="Folder of the report; must not exist."),
+) -> None:
+    """Evaluate forecasters by style: tables with n and 95 % intervals, JSON, Markdown, Parquet and an HTML report."""
+    from stylesim.corpus import Corpus
+    from stylesim.forecasting.opening import open_forecaster
+    from stylesim.report.evaluate import evaluate as run
+    from stylesim.report.tables import error_table
+
+    if len(forecaster) < 2:
+        raise InputError("give at least one forecaster and, last, the corpus")
+    if out.exists():
+        raise InputError(f"{out} is there already; choose another --out, or remove it first")
+    *names, corpus_path = forecaster
+    corpus = Corpus(corpus_path)
+    view = corpus if split == "all" else corpus.split(split)
+    models = [open_forecaster(name) for name in names]
+    strata = tuple(part.strip() for part in by.split(",") if part.strip())
+    with progress_bar("evaluating", "windows") as progress:
+        report = run(models, view, by=strata, seed=seed, progress=lambda _name, done, total: progress(done, total))
+    partial = out.with_name(out.name + ".partial")
+    partial.mkdir(parents=True, exist_ok=True)
+    report.save(partial / "report.html")
+    partial.rename(out)
+    for stratum in strata:
+        table = error_table(report.evaluations, stratum)
+        show_table(table.caption, table.headings, [_texts(row, len(table.headings)) for row in table.rows])
+    say(f"{out / 'report.html'}")
+
+
+def _texts(row: Sequence[Cell], width: int) -> list[str]:
+    """The cells of a report's row as text; a cell that spans rows above is empty."""
+    texts = [f"{cell.text}\n{cell.note}" if cell.note else cell.text for cell in row]
+    return [""] * (width - len(texts)) + texts
+
+
+def render(
+    corpus: Path = typer.Argument(help="A corpus."),
+    scene: str | None = typer.Option(None, help="Scene id; the first scene without it."),
+    out: Path = typer.Option(..., "--out", help="Picture to write (.png or .svg)."),
+) -> None:
+    """Draw a scene: road, lights and tracks coloured by style."""
+    from stylesim.corpus import Corpus
+    from stylesim.report.picture import save_picture
+
+    opened = Corpus(corpus)
+    shown = opened.scene(scene or opened.info[0].scene_id)
+    labels = opened.labels("tdbm", "track") if opened.has_labels("tdbm", "track") else None
+    say(f"{save_picture(shown, out, labels=labels)}")
+
+
+def add_to(app: typer.Typer) -> None:
+    """Register the verbs."""
+    app.command("train")(train)
+    app.command("evaluate")(evaluate)
+    app.command("render")(render)
