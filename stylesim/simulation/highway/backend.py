@@ -11,11 +11,10 @@ from stylesim.scene import Scene
 from stylesim.simulation.highway.lanes import road_of
 from stylesim.simulation.highway.log import TrackLog
 from stylesim.simulation.highway.spec import LOG_HZ, options_of
-from stylesim.simulation.highway.traffic import Crew, JunctionTraffic, Traffic, highway_traffic
+from stylesim.simulation.highway.traffic import JUNCTION_NODES, Crew, JunctionTraffic, Traffic, highway_traffic
 from stylesim.tracks import TrackFlag, Tracks
 
 SOURCE = "highway_env"
-JUNCTION_NODES = "i"  # highway-env names the inner nodes of its intersection il0, ir0, ...
 
 
 class HighwayBackend:
@@ -35,9 +34,7 @@ class HighwayBackend:
         junction = options.layout == "intersection"
         time_s = scenario.warm_up_s + scenario.duration_s
         traffic = (
-            JunctionTraffic(options, drawn, crew)
-            if junction
-            else highway_traffic(options, drawn, crew, time_s=time_s)
+            JunctionTraffic(options, drawn, crew) if junction else highway_traffic(options, drawn, crew, time_s=time_s)
         )
         n_frames = round(scenario.duration_s * LOG_HZ)
         log = TrackLog(n_frames, 1.0 / LOG_HZ)

@@ -68,5 +68,3 @@ def road_of(network: RoadNetwork, *, junction_nodes: str = "") -> Road:
             )
         )
     return Road(tuple(lanes))
-
-

@@ -8,10 +8,12 @@ from typing import Any
 
 from highway_env.road.lane import AbstractLane, CircularLane
 
-STRIP_M = 0.5  # a car whose centre is this far outside a lane still reaches into it (half a car is 1 m wide)
+CLEAR_M = 1.3  # half a car's width and 0.3 m: what a path needs on either side of its centre
 LANES_AHEAD = 2  # through the junction and onto the exit
 ALIGNED_RAD = math.radians(60)  # who crosses is the regulation's business, who goes along is a leader
-STANDING_MPS = 0.5
+STANDING_MPS = 2.0  # and so is who crosses this slowly, or stands there
+YIELD_HARD = 2.0  # chosen: who yields late brakes with twice its comfortable deceleration
+GENTLE_MPS2 = 1.0  # chosen: least braking of who yields, so that it comes to rest
 
 
 def lanes_ahead(vehicle: Any) -> Iterator[tuple[float, AbstractLane]]:
@@ -30,10 +32,18 @@ def lanes_ahead(vehicle: Any) -> Iterator[tuple[float, AbstractLane]]:
         start += lane.length
 
 
-def reaches_into(lane: AbstractLane, along_m: float, lateral_m: float) -> bool:
-    """True where a car at these lane coordinates occupies part of the lane."""
-    inside = -lane.VEHICLE_LENGTH / 2 <= along_m < lane.length + lane.VEHICLE_LENGTH / 2
-    return bool(inside and abs(lateral_m) <= lane.width_at(along_m) / 2 + STRIP_M)
+def reaches_into(lane: AbstractLane, along_m: float, lateral_m: float, other: Any) -> bool:
+    """True where a car at these lane coordinates is in the way of one that follows the lane's centre."""
+    if not -lane.VEHICLE_LENGTH / 2 <= along_m < lane.length + lane.VEHICLE_LENGTH / 2:
+        return False
+    angle = other.heading - lane.heading_at(along_m)
+    extent = (other.LENGTH * abs(math.sin(angle)) + other.WIDTH * abs(math.cos(angle))) / 2
+    return bool(abs(lateral_m) <= extent + CLEAR_M)
+
+
+def stopping_m(speed_mps: float, braking_mps2: float) -> float:
+    """Distance that braking from that speed to rest takes, m."""
+    return speed_mps**2 / (2 * braking_mps2)
 
 
 def leader_beyond(vehicle: Any) -> Any:
@@ -44,7 +54,7 @@ def leader_beyond(vehicle: Any) -> Any:
             if other is vehicle:
                 continue
             along, lateral = lane.local_coordinates(other.position)
-            if start + along >= nearest or start + along <= 0 or not reaches_into(lane, along, lateral):
+            if start + along >= nearest or start + along <= 0 or not reaches_into(lane, along, lateral, other):
                 continue
             if other.speed < STANDING_MPS or abs(lane.local_angle(other.heading, along)) < ALIGNED_RAD:
                 best, nearest = other, start + along
@@ -53,13 +63,14 @@ def leader_beyond(vehicle: Any) -> Any:
 
 def path_gap_m(vehicle: Any, other: Any) -> float:
     """Distance between the centres of two cars along the path of the first, m; negative if the other is behind."""
-    own = vehicle.lane
+    routed = bool(getattr(vehicle, "route", None))
+    own = vehicle.road.network.get_lane(vehicle.target_lane_index) if routed else vehicle.lane
     along, lateral = own.local_coordinates(other.position)
-    if not getattr(vehicle, "route", None) or reaches_into(own, along, lateral):
+    if not routed or reaches_into(own, along, lateral, other):
         return float(along - own.local_coordinates(vehicle.position)[0])
     for start, lane in lanes_ahead(vehicle):
         ahead, aside = lane.local_coordinates(other.position)
-        if reaches_into(lane, ahead, aside):
+        if reaches_into(lane, ahead, aside, other):
             return float(start + ahead)
     return float(along - own.local_coordinates(vehicle.position)[0])
 
@@ -79,3 +90,17 @@ def curve_speed_mps(vehicle: Any, comfort_mps2: float) -> float:
             curve = comfort_mps2 * lane.radius
             result = min(result, math.sqrt(curve + 2 * comfort_mps2 * max(start, 0.0)))
     return result
+
+
+def braking_to_yield_mps2(vehicle: Any, comfort_mps2: float) -> float:
+    """Deceleration of a driver who yields: to the end of its lane if that is on the way into the junction.
+
+    v^2 / (2 d) where that stops it before the line and at least `GENTLE_MPS2`; who is too close to stop with
+    twice its comfortable deceleration, or is inside the junction, brakes with that [ours].
+    """
+    hard = YIELD_HARD * comfort_mps2
+    start = next((distance for distance, _ in lanes_ahead(vehicle)), math.nan)
+    room = start - vehicle.LENGTH / 2
+    if not room > 0 or isinstance(vehicle.lane, CircularLane):
+        return hard
+    return float(min(max(vehicle.speed**2 / (2 * room), GENTLE_MPS2), hard))

@@ -27,7 +27,9 @@ class StyledRoad(Road):  # type: ignore[misc]
 
     def neighbour_vehicles(self, vehicle: Any, lane_index: Any = None) -> tuple[Any, Any]:
         """The cars in front of and behind `vehicle` on that lane; on its route also beyond the lane's end."""
-        lane_index = lane_index or vehicle.lane_index
+        routed = bool(getattr(vehicle, "route", None))
+        if lane_index is None or routed:  # where paths part, the nearest lane may be one that it does not follow
+            lane_index = vehicle.target_lane_index if routed else vehicle.lane_index
         if lane_index not in self._on_lane:
             self._on_lane[lane_index] = self._occupants(lane_index)
         places, cars = self._on_lane[lane_index]
@@ -35,7 +37,7 @@ class StyledRoad(Road):  # type: ignore[misc]
         at = bisect_left(places, here)
         front = next((car for car in cars[at:] if car is not vehicle), None)
         rear = next((car for car in reversed(cars[:at]) if car is not vehicle), None)
-        if front is None and getattr(vehicle, "route", None):
+        if front is None and routed:
             front = leader_beyond(vehicle)
         return front, rear
 
@@ -44,7 +46,7 @@ class StyledRoad(Road):  # type: ignore[misc]
         found = []
         for number, car in enumerate(self.vehicles + [o for o in self.objects if not isinstance(o, Landmark)]):
             along, lateral = lane.local_coordinates(car.position)
-            if reaches_into(lane, along, lateral) or getattr(car, "target_lane_index", None) == lane_index:
+            if reaches_into(lane, along, lateral, car) or getattr(car, "target_lane_index", None) == lane_index:
                 found.append((along, number, car))
         found.sort(key=lambda item: item[:2])
         return [along for along, _, _ in found], [car for _, _, car in found]

@@ -12,12 +12,15 @@ from highway_env.road.road import RoadNetwork
 
 from stylesim.population import Population
 from stylesim.randomness import stream
+from stylesim.simulation.highway.right_of_way import RightOfWay
 from stylesim.simulation.highway.road import StyledRegulatedRoad, StyledRoad
 from stylesim.simulation.highway.spec import HighwayOptions
 from stylesim.simulation.highway.vehicle import TOP_SPEED_MPS, StyledVehicle
 
 RUN_UP_M = 100.0  # road behind the last car at the start
 SPAWN_EVERY_S = 1.0  # highway-env's intersection clears and spawns once per decision of 1 s
+LOOK_EVERY_S = 0.5  # highway-env's regulation runs at 2 Hz
+JUNCTION_NODES = "i"  # highway-env names the inner nodes of its intersection il0, ir0, ...
 
 
 class Crew:
@@ -144,10 +147,14 @@ class JunctionTraffic(Traffic):
         self._junction = Junction(options, drawn, crew)
         super().__init__(self._junction.road, crew, options)
         self._steps_per_turn = round(SPAWN_EVERY_S * options.simulation_hz)
+        self._steps_per_look = round(LOOK_EVERY_S * options.simulation_hz)
         self._steps = 0
+        self._right_of_way = RightOfWay(self.road.network, junction_nodes=JUNCTION_NODES)
 
     def advance(self) -> None:
-        """One simulation step; once a second cars come and go."""
+        """One simulation step; twice a second drivers look for gaps, once a second cars come and go."""
+        if self._steps % self._steps_per_look == 0:
+            self._right_of_way.assign(self.road.vehicles)
         super().advance()
         self._steps += 1
         if self._steps % self._steps_per_turn == 0:

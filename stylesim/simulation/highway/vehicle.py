@@ -11,7 +11,7 @@ from highway_env.vehicle.behavior import IDMVehicle
 from highway_env.vehicle.kinematics import Vehicle
 
 from stylesim.simulation.highway.noise import OrnsteinUhlenbeck
-from stylesim.simulation.highway.path import curve_speed_mps, path_gap_m
+from stylesim.simulation.highway.path import braking_to_yield_mps2, curve_speed_mps, path_gap_m
 from stylesim.style import DriverStyle
 
 EMERGENCY_MPS2 = -4.5  # SUMO's default emergency threshold is its comfortable deceleration of 4.5 m/s2
@@ -22,11 +22,13 @@ MOBIL_SAFE_MPS2 = 2.0  # highway-env's imposed braking, an average driver's
 NEUTRAL_GAP_S = 4.5  # gap acceptance of the neutral driver in agents/styles.yaml
 PEDAL_LAG = 0.3  # chosen: drivers anticipate, so only this part of the reaction time is left as a lag of the pedal
 WANDER_SMOOTHING_S = 0.6  # chosen, because a car's lateral velocity has no jumps
+HEADING_S, LATERAL_S = 0.3, 1.0  # chosen: slower than highway-env (0.2, 0.6), so that wheels of finite speed do not overshoot
+BEND_M = 0.5  # over which the curvature of the lane is taken
 KERB_M = 0.1  # what wander leaves between the car's side and the lane's edge
 CALM_MPS = 5.0  # below this speed wander and pedal noise fade: who stands does not stray
 LANE_ANGLE_RAD = 0.35  # chosen: largest angle to the lane; highway-env's 45 degrees spins slow cars
 WHEEL_RAD = 0.7  # chosen: lock of the front wheels; with highway-env's geometry a turning radius of 6.4 m
-WHEEL_RAD_PS = 1.0  # chosen: how fast a driver turns them; without a limit the lateral velocity jumps
+WHEEL_RAD_PS = 2.0  # chosen: how fast a driver turns them; without a limit the lateral velocity jumps
 
 
 class StyledVehicle(IDMVehicle):  # type: ignore[misc]
@@ -47,19 +49,23 @@ class StyledVehicle(IDMVehicle):  # type: ignore[misc]
         self.slip_rad = 0.0  # angle between its course and its body
         self.emergency_braked = False
         self.crashed_s = 0.0
+        self.waits_for_gap = False  # set by the junction's right of way
         self._hesitation_s = 0.0
         self._was_yielding = False
         self._change_from_m = 0.0
         self._change_s = math.inf
         self._steered_lane = self.target_lane_index
 
-    def adopt(self, style: DriverStyle, *, driver_id: str, pedal: np.random.Generator, lane: np.random.Generator) -> None:
+    def adopt(
+        self, style: DriverStyle, *, driver_id: str, pedal: np.random.Generator, lane: np.random.Generator
+    ) -> None:
         """Make this the car of one driver: instance parameters instead of class constants."""
         self.style, self.driver_id = style, driver_id
         self.COMFORT_ACC_MAX = style.max_acceleration_mps2
         self.COMFORT_ACC_MIN = -style.comfortable_deceleration_mps2
         self.ACC_MAX, self.MAX_SPEED, self.DELTA = TYRES_MPS2, TOP_SPEED_MPS, 4.0
         self.MAX_STEERING_ANGLE = WHEEL_RAD
+        self.KP_HEADING, self.TAU_PURSUIT, self.KP_LATERAL = 1 / HEADING_S, HEADING_S, 1 / LATERAL_S
         self.TIME_WANTED = style.time_headway_s
         self.DISTANCE_WANTED = style.min_gap_m + self.LENGTH
         self.POLITENESS = style.politeness
@@ -73,7 +79,7 @@ class StyledVehicle(IDMVehicle):  # type: ignore[misc]
     @property
     def wished_speed_mps(self) -> float:
         """What the driver would drive on a free road here; 0 while it yields or hesitates after yielding."""
-        if getattr(self, "is_yielding", False) or self._hesitation_s > 0:
+        if self.waits_for_gap or getattr(self, "is_yielding", False) or self._hesitation_s > 0:
             return 0.0
         if self.style is None:
             return float(np.clip(self.target_speed, 0, self.lane.speed_limit))
@@ -87,7 +93,10 @@ class StyledVehicle(IDMVehicle):  # type: ignore[misc]
         speed = max(ego_vehicle.speed, 0.0)
         wish = getattr(ego_vehicle, "wished_speed_mps", ego_vehicle.speed)
         ease, bold = -self.COMFORT_ACC_MIN, self.COMFORT_ACC_MAX
-        result = max(bold * (1.0 - (speed / wish) ** self.DELTA), -ease) if wish > 0.1 else -ease
+        if wish > 0.1:
+            result = max(bold * (1.0 - (speed / wish) ** self.DELTA), -ease)
+        else:
+            result = -braking_to_yield_mps2(ego_vehicle, ease)
         if front_vehicle is not None:
             bumpers = (ego_vehicle.LENGTH + front_vehicle.LENGTH) / 2
             gap = max(path_gap_m(ego_vehicle, front_vehicle) - bumpers, 0.1)
@@ -107,7 +116,9 @@ class StyledVehicle(IDMVehicle):  # type: ignore[misc]
         speed = not_zero(self.speed)
         command = (rate + self.KP_LATERAL * (place - lateral)) / speed
         reach = math.sin(LANE_ANGLE_RAD)
-        ahead = lane.heading_at(along + self.speed * self.TAU_PURSUIT)
+        bend = wrap_to_pi(lane.heading_at(along + BEND_M) - lane.heading_at(along)) / BEND_M
+        slip_in_bend = math.asin(min(max(self.LENGTH / 2 * bend, -0.5), 0.5))
+        ahead = lane.heading_at(along + self.speed * self.TAU_PURSUIT) - slip_in_bend
         turn = self.KP_HEADING * wrap_to_pi(ahead + math.asin(min(max(command, -reach), reach)) - self.heading)
         slip = math.asin(min(max(self.LENGTH / 2 / speed * turn, -1.0), 1.0))
         steering = math.atan(2 * math.tan(slip))
@@ -141,7 +152,7 @@ class StyledVehicle(IDMVehicle):  # type: ignore[misc]
         self.crashed_s += dt if self.crashed else 0.0
 
     def _drive(self, dt: float, style: DriverStyle) -> None:
-        yielding = bool(getattr(self, "is_yielding", False))
+        yielding = self.waits_for_gap or bool(getattr(self, "is_yielding", False))
         if self._was_yielding and not yielding and self.speed < CALM_MPS:
             self._hesitation_s = style.reaction_time_s
         self._was_yielding = yielding
