@@ -11,6 +11,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import polars as pl
@@ -54,7 +55,7 @@ NOMINAL_SIZE_M = {
     AgentKind.OTHER: (1.0, 1.0),
 }
 _NUMBERS = ("position_x", "position_y", "heading", "velocity_x", "velocity_y")
-_COLUMNS: dict[str, type[pl.DataType]] = {
+_COLUMNS: dict[str, Any] = {
     "track_id": pl.String,
     "object_type": pl.String,
     "timestep": pl.Int64,

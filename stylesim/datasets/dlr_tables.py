@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import polars as pl
@@ -39,7 +40,7 @@ _CLASSES = {
     "classifications_van": AgentKind.CAR,  # a van is driven like a car; its share is added to the car's [ours]
     "classifications_truck": AgentKind.TRUCK,
 }
-_COLUMNS: dict[str, type[pl.DataType]] = {
+_COLUMNS: dict[str, Any] = {
     "timestamp": pl.String,
     "id": pl.String,  # about 1.7e15: never through a float
     **dict.fromkeys((*_NUMBERS, *_CLASSES), pl.Float64),

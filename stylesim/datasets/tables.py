@@ -29,8 +29,8 @@ def file_bytes(path: Path) -> bytes:
         raise InputError(f"cannot read {path}: {error.strerror or error}") from error
 
 
-def csv_table(path: Path, columns: Mapping[str, type[pl.DataType]]) -> pl.DataFrame:
-    """The named columns of a CSV file with a header, in those types; what cannot be parsed is null.
+def csv_table(path: Path, columns: Mapping[str, Any]) -> pl.DataFrame:
+    """The named columns of a CSV file with a header, in those polars types; what cannot be parsed is null.
 
     InputError where the file is no text, empty, or lacks a column.
     """
