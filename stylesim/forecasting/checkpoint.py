@@ -24,6 +24,10 @@ MODEL_FILE = "model.pt"
 FORMAT, VERSION = "stylesim-forecaster", 1
 
 
+def _first_line(error: Exception) -> str:
+    return (str(error).splitlines() or [type(error).__name__])[0][:200]
+
+
 def write_tensors(path: Path, content: Mapping[str, Any]) -> None:
     """A file of tensors, numbers and strings that appears under its name only when whole."""
     buffer = io.BytesIO()
@@ -41,7 +45,7 @@ def read_tensors(path: Path, *, format_name: str, version: int) -> dict[str, Any
     except FileNotFoundError:
         raise InputError(f"no such file: {path}; train a model with `stylesim train`") from None
     except (pickle.UnpicklingError, RuntimeError, EOFError, zipfile.BadZipFile, ValueError, KeyError) as error:
-        raise InputError(f"{refused}, or it is damaged: {str(error).splitlines()[0][:200]}") from None
+        raise InputError(f"{refused}, or it is damaged: {_first_line(error)}") from None
     if not isinstance(content, dict) or content.get("format") != format_name:
         raise InputError(f"{refused}: it has no {format_name!r} mark")
     found = content.get("version")
@@ -73,11 +77,12 @@ def load(path: str | Path) -> TrainedForecaster:
     try:
         config = ModelConfig.from_dict(json.loads(content["config"]))
         conditioner = conditioner_from_dict(json.loads(content["conditioner"]))
-        network = ForecastNetwork(config)
+        with torch.random.fork_rng():  # its start weights are drawn, then overwritten
+            network = ForecastNetwork(config)
         network.load_state_dict(content["state"])
         return TrainedForecaster(str(content["name"]), network, conditioner)
     except (KeyError, TypeError, ValueError, RuntimeError) as error:
-        raise InputError(f"{file} is a damaged checkpoint: {str(error).splitlines()[0][:200]}") from error
+        raise InputError(f"{file} is a damaged checkpoint: {_first_line(error)}") from error
 
 
 def conditioner_from_dict(raw: Mapping[str, Any] | None) -> StyleConditioner | None:

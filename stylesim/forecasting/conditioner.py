@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
-from typing import Any, Protocol
+from typing import Any, Protocol, runtime_checkable
 
 import numpy as np
 from jaxtyping import Int32, Int64
@@ -17,6 +17,7 @@ from stylesim.scene import Scene
 CLUSTERS, CONTEXTS = 3, 2  # REFERENCE section 4: K = 3 [ours]; highway, non-highway [paper]
 
 
+@runtime_checkable
 class Judges(Protocol):
     """Fitted labellers that a history is shown to (`judging.LabelerJudges`; a test may have its own)."""
 

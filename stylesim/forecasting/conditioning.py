@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any, Protocol
+from typing import Any
 
 import numpy as np
 from jaxtyping import Bool, Float64, Int64
@@ -17,19 +17,10 @@ from jaxtyping import Bool, Float64, Int64
 from stylesim.errors import InputError, unknown
 from stylesim.forecasting.intentions import kmeans, nearest_centre
 from stylesim.labels import UNDETERMINED, LabelFlag, StyleLabels
-from stylesim.scene import Scene
 
 CLUSTER_FEATURES = ("max_abs_acceleration", "var_acceleration", "var_speed", "gamma")  # REFERENCE section 2 [paper]
 LEAST_IN_CELL = 20  # REFERENCE section 4: a cell with fewer training samples is given the null token [ours]
 NULL = -1
-
-
-class HistoryLabeller(Protocol):
-    """Labels agents of a history; `stylesim.labelers.history_labels` of a fitted labeller is one."""
-
-    def __call__(self, history: Scene, agent_index: Int64[np.ndarray, " driver"]) -> StyleLabels:
-        """One row per agent, in the order asked."""
-        ...
 
 
 @dataclass(frozen=True, eq=False)

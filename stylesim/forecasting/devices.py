@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Any, Protocol
+from typing import Any, Protocol, runtime_checkable
 
 import torch
 from torch import Tensor, nn
@@ -12,6 +12,7 @@ from stylesim.errors import MissingDependencyError, unknown
 ACCELERATORS = ("auto", "cpu", "gpu")
 
 
+@runtime_checkable
 class Runtime(Protocol):
     """The little that the training loop needs to know of where it runs."""
 
@@ -48,7 +49,7 @@ class FabricRuntime:
             from lightning_fabric import Fabric
         except ImportError:
             raise MissingDependencyError(
-                "training on a GPU needs lightning-fabric: pip install lightning-fabric"
+                "training on a GPU needs lightning-fabric: pip install 'stylesim[train]'"
             ) from None
         self.fabric = Fabric(accelerator=accelerator, devices=1, precision=precision)  # type: ignore[arg-type]
         self.fabric.launch()

@@ -25,9 +25,9 @@ STYLE_METHODS = ("tdbm", "kdsc")
 
 @dataclass(frozen=True, eq=False)
 class LabelerJudges:
-    """Two fitted labellers, both for histories of `history_s`: `style` gives the class, `kinematic` (KDSC) the features.
+    """Two fitted labellers, both for histories of `history_s`: `style` gives the class, `kinematic` (KDSC) features.
 
-    They may be one object.
+    For condition "kdsc" they are one object.
     """
 
     style: Labeler
@@ -42,7 +42,7 @@ class LabelerJudges:
             raise unknown("style method", condition, STYLE_METHODS)
         kinematic = KDSC(history_s=(spec.history_s,)).fit(train)
         if condition == "kdsc":
-            return cls(kinematic, kinematic, tuple(kinematic.classes), spec.history_s)
+            return cls(kinematic, kinematic, tuple(kinematic.names), spec.history_s)
         style = TDBM(history_s=(spec.history_s,)).fit(train)
         return cls(style, kinematic, STYLE_CLASSES, spec.history_s)
 

@@ -96,7 +96,9 @@ class PatchEncoder(nn.Module):
         """One token per agent; missing steps are zeros, and their `valid` feature says so."""
         padding = self.patches * self.patch - history.shape[2]
         padded = functional.pad(history, (0, 0, padding, 0))  # on the left: t0 keeps its place
-        patched = padded.unflatten(2, (self.patches, self.patch)).flatten(3)  # [batch agent patch patch*feature]
+        patched = padded.reshape(
+            *padded.shape[:2], self.patches, self.patch * padded.shape[3]
+        )  # [batch agent patch patch*feature]
         token: Tensor = self.of_all(functional.gelu(self.of_patch(patched)).flatten(2))
         return token
 

@@ -59,7 +59,7 @@ class Loop:
         self.data, self.settings, self.runtime, self.folder = data, settings, runtime, folder
         groups = style_parameter_groups(network, lr=settings.lr, weight_decay=settings.weight_decay)
         self.network = network
-        self.forward, self.optimizer = runtime.setup(network, torch.optim.AdamW(groups))
+        self.forward, self.optimizer = runtime.setup(network, torch.optim.AdamW(groups, fused=True))
         self.peak_lr = [group["lr"] for group in self.optimizer.param_groups]
         per_epoch = len(self._batches(0))
         whole = settings.epochs * per_epoch

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 from hashlib import sha256
 from pathlib import Path
 from types import TracebackType
-from typing import Any, BinaryIO, Protocol
+from typing import Any, BinaryIO, Protocol, runtime_checkable
 
 import numpy as np
 import numpy.typing as npt
@@ -24,7 +24,10 @@ NO_ROAD = -1
 
 @dataclass(frozen=True, eq=False)
 class SampleStore:
-    """Everything that samples are gathered from. Ranges are (start, stop) into the arrays they name."""
+    """Everything that samples are gathered from. Ranges are (start, stop) into the arrays they name.
+
+    There are as many targets as samples, or none where nothing is learned.
+    """
 
     agent_state: Float32[np.ndarray, "agent time 6"]
     agent_pose: Float32[np.ndarray, "agent 3"]
@@ -38,9 +41,9 @@ class SampleStore:
     snapshot_agents: Int64[np.ndarray, "snapshot 2"]
     snapshot_lanes: Int64[np.ndarray, " snapshot"]  # start of its run in lane_signal, -1: no signals
     sample: Int64[np.ndarray, "sample 3"]  # snapshot, agent (row of agent_state), road or NO_ROAD
-    origin: Int64[np.ndarray, "sample 4"]  # scene number (train and val), t0, agent index, split (0, 1)
-    weight: Float32[np.ndarray, " sample"]
-    future_m: Float32[np.ndarray, "sample future 2"]  # scene frame
+    origin: Int64[np.ndarray, "target 4"]  # scene number (train and val), t0, agent index, split (0, 1)
+    weight: Float32[np.ndarray, " target"]
+    future_m: Float32[np.ndarray, "target future 2"]  # scene frame
 
     def __len__(self) -> int:
         """Number of samples."""
@@ -79,6 +82,7 @@ def _layout(config: InputConfig) -> dict[str, tuple[type, tuple[int, ...]]]:
     }
 
 
+@runtime_checkable
 class Sink(Protocol):
     """Takes rows of named arrays, in order."""
 
@@ -100,10 +104,10 @@ class MemorySink:
 
     def store(self) -> SampleStore:
         """The store of all rows so far."""
-        empty: dict[str, npt.NDArray[Any]] = {
-            name: np.zeros((0, *shape), dtype) for name, (dtype, shape) in self._layout.items()
-        }
-        return SampleStore(**{name: np.concatenate([empty[name], *rows]) for name, rows in self._rows.items()})
+        arrays: dict[str, npt.NDArray[Any]] = {}
+        for name, (dtype, shape) in self._layout.items():
+            arrays[name] = np.concatenate([np.zeros((0, *shape), dtype), *self._rows[name]])
+        return SampleStore(**arrays)
 
 
 class FileSink:
