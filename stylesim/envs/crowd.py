@@ -34,13 +34,16 @@ class Crowd:
         return Crowd(population, scenario)
 
 
-def resolved_population(
-    population: str | Population | None, styles: str | Mapping[str, float] | None, *, default: str = "naturalistic"
-) -> Population:
-    """The population by name, path or object, or the one of the given shares; InputError if both are given."""
+def resolved_population(population: Any, styles: Any, *, default: str = "naturalistic") -> Population:
+    """The population by name, path or object, or the one of the given shares (mapping or text).
+
+    Whatever a user gives is taken and checked here: InputError for other types, unknown names, or both at once.
+    """
     if styles is not None:
         if population is not None:
             raise InputError("give population or styles, not both; Population.reweighted changes single shares")
+        if not isinstance(styles, str | Mapping):
+            raise InputError(f"styles is a mapping of shares or a text, not {type(styles).__name__}")
         return Population.of(**(_parsed_shares(styles) if isinstance(styles, str) else dict(styles)))
     if isinstance(population, Population):
         return population
@@ -62,7 +65,7 @@ def _parsed_shares(text: str) -> dict[str, float]:
     return shares
 
 
-def resolved_scenario(scenario: str | Scenario, *, backend: str) -> Scenario:
+def resolved_scenario(scenario: Any, *, backend: str) -> Scenario:
     """The scenario by name, path or object; InputError if it runs in another simulator than `backend`."""
     if isinstance(scenario, str):
         scenario = load_scenario(scenario)

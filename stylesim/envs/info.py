@@ -32,11 +32,11 @@ def described(snapshot: Snapshot, rows: Int64[np.ndarray, " neighbour"], places:
         "arrived": bool(ego.arrived),
         "vehicles": len(snapshot.number) - 1,
         "neighbours": {
-            "number": filled(snapshot.number, -1),
+            "number": filled(snapshot.number, -1.0),
             "style": (*styles, *("",) * free),
             "aggressiveness": filled(snapshot.knob, 0.0),
             "decision": (*(DECISIONS[i] for i in snapshot.decision[rows]), *("",) * free),
-            "ran_red": filled(snapshot.ran_red, 0),
-            "crashed": filled(snapshot.crashed, 0),
+            "ran_red": filled(snapshot.ran_red, 0.0),
+            "crashed": filled(snapshot.crashed, 0.0),
         },
     }

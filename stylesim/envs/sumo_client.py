@@ -84,8 +84,8 @@ class SumoWorld:
         if child is None or child.stdin is None or child.stdout is None:
             raise SimulationError("the simulation of this environment is not running; call reset()")
         try:
-            send(child.stdin, kind, body)  # type: ignore[arg-type]  # Popen's pipes are binary files
-            answer, content = receive(child.stdout)  # type: ignore[arg-type]
+            send(child.stdin, kind, body)
+            answer, content = receive(child.stdout)
         except (EOFError, OSError, KeyboardInterrupt) as error:
             words = self._last_words()
             self.close()  # after an interrupt the pipes are out of step, so this child is of no more use

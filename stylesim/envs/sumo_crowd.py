@@ -11,6 +11,7 @@ import numpy as np
 from jaxtyping import Float64, Int64
 
 from stylesim.envs.sumo_light import LightWatch
+from stylesim.envs.sumo_wander import Wander
 from stylesim.envs.world import DECIDED_GO, DECIDED_STOP, Picture
 from stylesim.errors import InputError
 from stylesim.population import Population
@@ -18,8 +19,12 @@ from stylesim.scenario import Scenario
 from stylesim.signals import SignalState
 from stylesim.simulation.sumo.engine import Engine
 from stylesim.simulation.sumo.episode import DT_S, prepare_episode, sumo_options
+from stylesim.simulation.sumo.stopzone import StopZone
 from stylesim.simulation.sumo.yellow import YellowController
 from stylesim.style import STYLE_CLASSES
+
+# By default SUMO reports a collision where the gap falls below minGap, although nobody has touched anybody.
+TOUCHING_ONLY = ("--collision.mingap-factor", "0")
 
 
 class SumoCrowd:
@@ -38,10 +43,12 @@ class SumoCrowd:
             self.files = prepare_episode(longer, population, seed=seed, episode=0, folder=Path(folder))
             if self.files.options.signal is None:
                 raise InputError(f"scenario {scenario.name!r} has no traffic light; this environment needs one")
-            engine.load(sumo_options(self.files))  # reads the files whole
+            engine.load([*sumo_options(self.files), *TOUCHING_ONLY])  # reads the files whole
         self._engine = engine
         self.sumo: Any = engine.sumo
         self._yellow = YellowController(engine.sumo, self.files)
+        self._zone = StopZone(engine.sumo, self.files)
+        self._wander = Wander(self.files)
         self._events_seen = 0
         self._step = 0
         self._light = LightWatch(engine.sumo, self.files.network, self.files.options.signal.junction)
@@ -71,6 +78,7 @@ class SumoCrowd:
     def step(self) -> None:
         """0.1 s, with the drivers' decisions at yellow."""
         self._yellow.before_step(self._step)
+        self._zone.before_step(self._step)
         self._engine.step()
         self._step += 1
         self._poses = None
@@ -100,9 +108,14 @@ class SumoCrowd:
             self.rows = np.fromiter(self._here.values(), np.int64, len(self._here))
 
     def poses(self) -> Float64[np.ndarray, "vehicle 7"]:
-        """Box centres, velocities, headings and sizes of `rows`; computed once per step."""
+        """Box centres, velocities, headings and sizes of `rows`, with their wander; computed once per step.
+
+        Wander starts with the first call; its first value is stationary, so what came before does not matter.
+        """
         if self._poses is None:
-            self._poses = poses_of(self.sumo, list(self._here), self._size[self.rows])
+            poses = poses_of(self.sumo, list(self._here), self._size[self.rows])
+            speed = np.hypot(poses[:, 2], poses[:, 3])
+            self._poses = shifted(poses, *self._wander.advance(self.rows, speed))
         return self._poses
 
     def light(self, link: int) -> tuple[SignalState, float]:
@@ -135,3 +148,20 @@ def poses_of(sumo: Any, names: list[str], size_m: Float64[np.ndarray, "vehicle 2
     pose[:, 4] = np.remainder(heading + np.pi, 2 * np.pi) - np.pi
     pose[:, 5:] = size_m
     return pose
+
+
+def shifted(
+    poses: Float64[np.ndarray, "vehicle 7"],
+    offset_m: Float64[np.ndarray, " vehicle"],
+    rate_mps: Float64[np.ndarray, " vehicle"],
+) -> Float64[np.ndarray, "vehicle 7"]:
+    """The poses moved to the left, with the lateral speed in their velocity and heading."""
+    left_x, left_y = -np.sin(poses[:, 4]), np.cos(poses[:, 4])
+    speed = np.hypot(poses[:, 2], poses[:, 3])
+    moved = poses.copy()
+    moved[:, 0] += offset_m * left_x
+    moved[:, 1] += offset_m * left_y
+    moved[:, 2] += rate_mps * left_x
+    moved[:, 3] += rate_mps * left_y
+    moved[:, 4] += np.arctan2(rate_mps, np.maximum(speed, 1e-3))
+    return moved

@@ -87,6 +87,6 @@ class SumoEpisode:
         )
 
 
-def _led_by(first: float, rest: np.ndarray) -> np.ndarray:
+def _led_by(first: float | int, rest: np.ndarray) -> np.ndarray:
     """An array of the ego's value and the others'."""
     return np.concatenate([np.array([first], rest.dtype), rest])

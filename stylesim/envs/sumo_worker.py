@@ -6,12 +6,12 @@ still holds the pipe's other end.
 
 from __future__ import annotations
 
+import io
 import os
 import signal
 import sys
 import threading
 import time
-from typing import BinaryIO
 
 from stylesim.envs.sumo_episode import SumoEpisode
 from stylesim.envs.wire import (
@@ -70,7 +70,7 @@ def _watch_parent(parent: int) -> None:
     os._exit(1)
 
 
-def _private_streams() -> tuple[BinaryIO, BinaryIO]:
+def _private_streams() -> tuple[io.BufferedReader, io.BufferedWriter]:
     """The pipes to the parent. What SUMO writes to standard output goes to standard error instead."""
     source = os.fdopen(os.dup(0), "rb")
     sink = os.fdopen(os.dup(1), "wb")

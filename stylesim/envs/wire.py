@@ -10,7 +10,7 @@ import json
 import struct
 from collections.abc import Mapping
 from enum import Enum
-from typing import Any, BinaryIO
+from typing import Any, Protocol, runtime_checkable
 
 import numpy as np
 
@@ -36,6 +36,21 @@ COLUMNS: tuple[tuple[str, str, int], ...] = (  # field of Snapshot, dtype, numbe
 MAX_BODY = 1 << 26  # more is no message of ours
 
 
+@runtime_checkable
+class Readable(Protocol):
+    """What messages are read from."""
+
+    def read(self, size: int, /) -> bytes: ...  # noqa: D102
+
+
+@runtime_checkable
+class Writable(Protocol):
+    """What messages are written to."""
+
+    def write(self, data: bytes, /) -> int: ...  # noqa: D102
+    def flush(self) -> None: ...  # noqa: D102
+
+
 class Kind(Enum):
     """What a message is."""
 
@@ -46,13 +61,13 @@ class Kind(Enum):
     ERROR = ord("E")
 
 
-def send(stream: BinaryIO, kind: Kind, body: bytes = b"") -> None:
+def send(stream: Writable, kind: Kind, body: bytes = b"") -> None:
     """Write one message."""
     stream.write(HEAD.pack(len(body), kind.value) + body)
     stream.flush()
 
 
-def receive(stream: BinaryIO) -> tuple[Kind, bytes]:
+def receive(stream: Readable) -> tuple[Kind, bytes]:
     """Read one message; EOFError where the other side is gone."""
     length, kind = HEAD.unpack(_exactly(stream, HEAD.size))
     if length > MAX_BODY:
@@ -60,7 +75,7 @@ def receive(stream: BinaryIO) -> tuple[Kind, bytes]:
     return Kind(kind), _exactly(stream, length)
 
 
-def _exactly(stream: BinaryIO, size: int) -> bytes:
+def _exactly(stream: Readable, size: int) -> bytes:
     data = stream.read(size)
     if len(data) < size:
         raise EOFError("the other side has closed the pipe")

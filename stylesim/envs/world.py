@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import NamedTuple, Protocol
+from typing import NamedTuple, Protocol, runtime_checkable
 
 import numpy as np
 from jaxtyping import Bool, Float32, Float64, Int8, Int32
@@ -78,6 +78,7 @@ class Picture:
     stop_lines_m: Float64[np.ndarray, "light 2 2"]
 
 
+@runtime_checkable
 class World(Protocol):
     """A simulation with an ego in it."""
 
