@@ -14,7 +14,7 @@ from stylesim.forecasting.style_embedding import style_parameter_groups
 from stylesim.forecasting.tensors import TensorBatch
 
 CONFIG = InputConfig(dt_s=0.2, history_steps=5, future_steps=10, agents=1, polylines=1, points=2)
-SAMPLES = 96
+SAMPLES = 32
 
 
 def world() -> tuple[TensorBatch, torch.Tensor, torch.Tensor]:
@@ -42,14 +42,16 @@ def world() -> tuple[TensorBatch, torch.Tensor, torch.Tensor]:
 @pytest.mark.parametrize("fusion", FUSIONS)
 def test_a_style_that_decides_the_future_is_used(fusion: str) -> None:
     torch.manual_seed(0)
-    config = ModelConfig(CONFIG, width=16, queries=6, encoder_layers=1, dropout=0.0, fusion=fusion, styles=2)
+    config = ModelConfig(
+        CONFIG, width=16, queries=6, encoder_layers=1, decoder_layers=1, dropout=0.0, fusion=fusion, styles=2
+    )
     model = ForecastNetwork(config)
     model.intention_mps2[:, :, 0] = torch.linspace(-2.0, 2.0, 6)
     inputs, style, future = world()
     optimizer = torch.optim.Adam(style_parameter_groups(model, lr=3e-3, weight_decay=0.0))
     before = model.style.u.detach().clone() if model.style is not None else torch.zeros(0)
     model.train()
-    for _ in range(120):
+    for _ in range(220):
         loss = mixture_loss(model(inputs, style), model.anchors(inputs), future)
         optimizer.zero_grad()
         loss.backward()
@@ -61,6 +63,6 @@ def test_a_style_that_decides_the_future_is_used(fusion: str) -> None:
     row = torch.arange(SAMPLES)
     assert knowing.logit.softmax(dim=1)[row, right].min() > 0.9
     assert (knowing.mean_m[row, right, -1] - future[:, -1]).norm(dim=1).max() < 0.5
-    assert ignorant.logit.softmax(dim=1)[row, right].max() < 0.8
+    assert ignorant.logit.softmax(dim=1)[row, right].mean() < 0.51  # nothing tells it which
     assert model.style is not None
     assert (model.style.u - before).abs().max() > 0.05
