@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from typing import Any, Protocol, Self, runtime_checkable
+from typing import Any, Protocol, runtime_checkable
 
 import numpy as np
 from jaxtyping import Int
@@ -29,7 +29,7 @@ class Labeler(Protocol):
         """Its name in file names and in `StyleLabels.method`."""
         ...
 
-    def fit(self, scenes: Iterable[Scene], *, progress: Progress | None = None) -> Self:
+    def fit(self, scenes: Iterable[Scene], *, progress: Progress | None = None) -> Labeler:
         """Learn scalers, clusters, whatever it needs, from scenes of a reference population (a Corpus is such)."""
         ...
 
@@ -56,6 +56,6 @@ class Labeler(Protocol):
         ...
 
     @classmethod
-    def from_dict(cls, raw: Mapping[str, Any]) -> Self:
+    def from_dict(cls, raw: Mapping[str, Any]) -> Labeler:
         """The labeller that `to_dict` described."""
         ...

@@ -3,17 +3,25 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
-from typing import Any, Protocol, Self
+from typing import Any
 
 import numpy as np
-from jaxtyping import Float64, Int
+from jaxtyping import Int
 
 from stylesim.errors import InputError
 from stylesim.labelers.base import Progress
 from stylesim.labelers.drivers import driver_samples
 from stylesim.labelers.features import KDSC_FEATURES
 from stylesim.labelers.judging import margin
-from stylesim.labelers.kdsc_model import CLUSTERED_FROM, SpanModel, cluster_tracks, clustered, fit_history, jerk_scale
+from stylesim.labelers.kdsc_model import (
+    CLUSTERED_FROM,
+    Clusterer,
+    SpanModel,
+    cluster_tracks,
+    clustered,
+    fit_history,
+    jerk_scale,
+)
 from stylesim.labelers.options import FeatureOptions
 from stylesim.labelers.provenance import Witness, content_hash
 from stylesim.labelers.rows import DriverRows
@@ -23,14 +31,6 @@ from stylesim.scene import Scene
 
 SCHEMA = 1
 FEATURE_NAMES = (*(name for name in KDSC_FEATURES if name != "std_jerk"), "gamma")
-
-
-class Clusterer(Protocol):
-    """Anything of scikit-learn that clusters: AgglomerativeClustering, KMeans, GaussianMixture, …"""
-
-    def fit_predict(self, X: Float64[np.ndarray, "driver 4"], /) -> Int[np.ndarray, " driver"]:
-        """The cluster of each row."""
-        ...
 
 
 class KDSC:
@@ -61,7 +61,7 @@ class KDSC:
         self.max_tracks = max_tracks
         self.seed = seed
 
-    def fit(self, scenes: Iterable[Scene], *, progress: Progress | None = None) -> Self:
+    def fit(self, scenes: Iterable[Scene], *, progress: Progress | None = None) -> KDSC:
         """Cluster one mean per driver of these scenes.
 
         InputError if there are too few drivers, or the clusterer finds another number of clusters than `names`.

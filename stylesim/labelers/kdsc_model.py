@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any, Protocol
+from typing import Any, Protocol, runtime_checkable
 
 import numpy as np
 from jaxtyping import Bool, Float64, Int
@@ -19,8 +19,9 @@ CLUSTERED = ("max_abs_acceleration", "var_acceleration", "var_speed", "gamma")
 CLUSTERED_FROM = ("max_abs_acceleration", "var_acceleration", "var_speed", "std_jerk")
 
 
-class Clusters(Protocol):
-    """What `cluster_tracks` needs of a clusterer."""
+@runtime_checkable
+class Clusterer(Protocol):
+    """Anything of scikit-learn that clusters: AgglomerativeClustering, KMeans, GaussianMixture, …"""
 
     def fit_predict(self, X: Float64[np.ndarray, "driver 4"], /) -> Int[np.ndarray, " driver"]:
         """The cluster of each row."""
@@ -125,7 +126,7 @@ def _finished(
 
 
 def cluster_tracks(
-    sample: DriverSample, clusterer: Clusters, clusters: int, *, length_s: float
+    sample: DriverSample, clusterer: Clusterer, clusters: int, *, length_s: float
 ) -> tuple[SpanModel, dict[tuple[str, str], int]]:
     """Cluster a sample; the model, and the cluster of each driver.
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Protocol, TypeVar
+from typing import Protocol, TypeVar, runtime_checkable
 
 import numpy as np
 from jaxtyping import Int
@@ -18,6 +18,7 @@ SPANS = ("track", "history")
 SAME_LENGTH_S = 0.051
 
 
+@runtime_checkable
 class OfLength(Protocol):
     """Something fitted for windows of one length."""
 

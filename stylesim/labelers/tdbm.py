@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
-from typing import Any, Self
+from typing import Any
 
 import numpy as np
 from jaxtyping import Bool, Float64, Int, Int8
@@ -63,7 +63,7 @@ class TDBM:
         """Its name in file names, another one for the other reading so that both can stand beside each other."""
         return "tdbm" if self.orientation == "printed" else "tdbm_transposed"
 
-    def fit(self, scenes: Iterable[Scene], *, progress: Progress | None = None) -> Self:
+    def fit(self, scenes: Iterable[Scene], *, progress: Progress | None = None) -> TDBM:
         """Fit the scalers on one mean per driver of these scenes. InputError if a feature is never known."""
         witness = Witness(scenes, progress)
         lengths = (self.options.window_s, *self.history_s)
