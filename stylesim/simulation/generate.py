@@ -47,7 +47,7 @@ def generate(
     CorpusError where the disk refuses; finished episodes are kept then, under `out.partial`.
     """
     job = _checked(scenarios, population, episodes=episodes, seed=seed, out=Path(out), workers=workers)
-    request = {"source": SOURCE, "seed": seed, "configuration": _configuration(job, episodes)}
+    request: dict[str, Any] = {"source": SOURCE, "seed": seed, "configuration": _configuration(job, episodes)}
     if Path(out).exists():
         return _finished(Path(out), request, resume=resume)
     started = time.monotonic()

@@ -163,9 +163,7 @@ class Pool:
             left -= 1
             done(task)
 
-    def _serve(
-        self, waiting: queue.SimpleQueue[Task], ended: queue.SimpleQueue[tuple[Task, Exception | None]]
-    ) -> None:
+    def _serve(self, waiting: queue.SimpleQueue[Task], ended: queue.SimpleQueue[tuple[Task, Exception | None]]) -> None:
         worker: Worker | None = None
         while not self._stopping.is_set():
             try:

@@ -41,6 +41,8 @@ class HighwayBackend:
         for _ in range(round(scenario.warm_up_s * options.simulation_hz)):
             traffic.advance()
         early = len(traffic.removed)
+        for vehicle in traffic.road.vehicles:
+            vehicle.emergency_braked = False  # what happens in the log counts
         for _ in range(n_frames):
             log.add(traffic.road.vehicles)
             for _ in range(options.simulation_hz // LOG_HZ):
@@ -65,8 +67,9 @@ class HighwayBackend:
 def _counts(tracks: Tracks, traffic: Traffic, log: TrackLog, *, removed_before_log: int) -> dict[str, int]:
     """What happened, as whole numbers; `collisions` are pairs that touched, the others are cars."""
     reasons = traffic.removals()
+    logged = set(log.vehicles)
     return {
-        "collisions": len([pair for pair in traffic.road.collided_pairs if pair & set(log.vehicles)]),
+        "collisions": sum(bool(pair & logged) for pair in traffic.road.collided_pairs),
         "collided": int(np.count_nonzero(tracks.flagged(TrackFlag.COLLIDED))),
         "emergency_braked": int(np.count_nonzero(tracks.flagged(TrackFlag.EMERGENCY_BRAKED))),
         "removed_crashed": reasons["crashed"],

@@ -10,7 +10,7 @@ import math
 from typing import Any
 
 import numpy as np
-from highway_env.road.lane import StraightLane
+from highway_env.road.lane import SineLane, StraightLane
 from highway_env.road.road import RoadNetwork
 from jaxtyping import Float
 
@@ -43,7 +43,7 @@ def road_of(network: RoadNetwork, *, junction_nodes: str = "") -> Road:
     lanes = []
     for index, lane in network.lanes_dict().items():
         start, end, number = index
-        spacing = STRAIGHT_M if type(lane) is StraightLane else CURVED_M
+        spacing = STRAIGHT_M if isinstance(lane, StraightLane) and not isinstance(lane, SineLane) else CURVED_M
         along = np.linspace(0.0, lane.length, max(2, math.ceil(lane.length / spacing) + 1))
         inside = bool(junction_nodes) and start.startswith(junction_nodes) and end.startswith(junction_nodes)
         beside = len(network.graph[start][end])

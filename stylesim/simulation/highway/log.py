@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 import numpy as np
 
 from stylesim.geometry import wrap_angle
+from stylesim.plausibility import implausible
 from stylesim.simulation.highway.vehicle import StyledVehicle
 from stylesim.tracks import AgentKind, TrackFlag, Tracks
 
@@ -33,7 +35,7 @@ class TrackLog:
         self._frame += 1
 
     def tracks(self, removed: set[str]) -> Tracks:
-        """Everything logged, by id; cars of `removed` carry the flag."""
+        """Everything logged, by id, flagged; a collision's push moves a car in one step, which is implausible."""
         order = sorted(self._number)
         place = {self._number[driver_id]: i for i, driver_id in enumerate(order)}
         state = np.full((len(order), self._n_frames, 5), np.nan)
@@ -41,7 +43,7 @@ class TrackLog:
             state[place[number], frame] = values
         cars = [self.vehicles[driver_id] for driver_id in order]
         valid = np.isfinite(state[..., 0])
-        return Tracks(
+        tracks = Tracks(
             agent_id=tuple(order),
             kind=np.full(len(cars), AgentKind.CAR),
             size_m=np.array([[car.LENGTH, car.WIDTH] for car in cars]).reshape(-1, 2),
@@ -53,6 +55,9 @@ class TrackLog:
             driver=tuple(car.style for car in cars),
             flags=np.array([_flags(car, removed) for car in cars], np.int32),
         )
+        assert tracks.flags is not None
+        contradicted = np.where(implausible(tracks).agents, np.int32(TrackFlag.IMPLAUSIBLE), np.int32(0))
+        return replace(tracks, flags=tracks.flags | contradicted)
 
 
 def _flags(car: StyledVehicle, removed: set[str]) -> int:

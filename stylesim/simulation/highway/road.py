@@ -11,6 +11,7 @@ from highway_env.road.road import Road
 from highway_env.vehicle.objects import Landmark
 
 from stylesim.simulation.highway.path import leader_beyond, reaches_into
+from stylesim.simulation.highway.quick import quicken
 
 
 class StyledRoad(Road):  # type: ignore[misc]
@@ -22,6 +23,7 @@ class StyledRoad(Road):  # type: ignore[misc]
 
     def __init__(self, *args: Any, **kwargs: Any) -> None:
         super().__init__(*args, **kwargs)
+        quicken(self.network)
         self.collided_pairs: set[frozenset[str]] = set()
         self._on_lane: dict[Any, tuple[list[float], list[Any]]] = {}
 

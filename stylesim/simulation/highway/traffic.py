@@ -99,6 +99,9 @@ class Junction(IntersectionEnv):  # type: ignore[misc]
     The car that highway-env would hand to an agent becomes one of the drivers.
     """
 
+    road: StyledRoad
+    controlled_vehicles: list[Any]
+
     def __init__(self, options: HighwayOptions, drawn: Mapping[str, float], crew: Crew) -> None:
         self._crew, self._limit_mps = crew, drawn["speed_limit_mps"]
         self.np_random = crew.stream("spawning")

@@ -10,6 +10,7 @@ from highway_env.utils import not_zero, wrap_to_pi
 from highway_env.vehicle.behavior import IDMVehicle
 from highway_env.vehicle.kinematics import Vehicle
 
+from stylesim.simulation.highway.following import cool
 from stylesim.simulation.highway.noise import OrnsteinUhlenbeck
 from stylesim.simulation.highway.path import braking_to_yield_mps2, curve_speed_mps, path_gap_m
 from stylesim.style import DriverStyle
@@ -22,7 +23,7 @@ MOBIL_SAFE_MPS2 = 2.0  # highway-env's imposed braking, an average driver's
 NEUTRAL_GAP_S = 4.5  # gap acceptance of the neutral driver in agents/styles.yaml
 PEDAL_LAG = 0.3  # chosen: drivers anticipate, so only this part of the reaction time is left as a lag of the pedal
 WANDER_SMOOTHING_S = 0.6  # chosen, because a car's lateral velocity has no jumps
-HEADING_S, LATERAL_S = 0.3, 1.0  # chosen: slower than highway-env (0.2, 0.6), so that wheels of finite speed do not overshoot
+HEADING_S, LATERAL_S = 0.3, 1.0  # chosen: highway-env's 0.2 and 0.6 overshoot when the wheels take time to turn
 BEND_M = 0.5  # over which the curvature of the lane is taken
 KERB_M = 0.1  # what wander leaves between the car's side and the lane's edge
 CALM_MPS = 5.0  # below this speed wander and pedal noise fade: who stands does not stray
@@ -38,6 +39,9 @@ class StyledVehicle(IDMVehicle):  # type: ignore[misc]
     speed is the style's factor times the lane's limit (highway-env would clip it to the limit) and no more than
     the curve allows, and the gap of the IDM is bumper to bumper.
     """
+
+    speed: float
+    action: dict[str, float]
 
     def __init__(self, *args: Any, **kwargs: Any) -> None:
         super().__init__(*args, **kwargs)
@@ -94,14 +98,15 @@ class StyledVehicle(IDMVehicle):  # type: ignore[misc]
         wish = getattr(ego_vehicle, "wished_speed_mps", ego_vehicle.speed)
         ease, bold = -self.COMFORT_ACC_MIN, self.COMFORT_ACC_MAX
         if wish > 0.1:
-            result = max(bold * (1.0 - (speed / wish) ** self.DELTA), -ease)
+            free = result = max(bold * (1.0 - (speed / wish) ** self.DELTA), -ease)
         else:
-            result = -braking_to_yield_mps2(ego_vehicle, ease)
+            free, result = 0.0, -braking_to_yield_mps2(ego_vehicle, ease)
         if front_vehicle is not None:
             bumpers = (ego_vehicle.LENGTH + front_vehicle.LENGTH) / 2
             gap = max(path_gap_m(ego_vehicle, front_vehicle) - bumpers, 0.1)
             wanted = max(self.desired_gap(ego_vehicle, front_vehicle) - self.LENGTH, self.DISTANCE_WANTED - self.LENGTH)
-            result -= bold * (wanted / gap) ** 2
+            idm = free - bold * (wanted / gap) ** 2
+            result = min(result, cool(idm, ego_vehicle, front_vehicle, gap, bold=bold, ease=ease))
         return float(max(result, -self.ACC_MAX))
 
     def steering_control(self, target_lane_index: Any) -> float:
