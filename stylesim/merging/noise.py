@@ -20,7 +20,7 @@ from jaxtyping import Bool, Float, Float64
 
 from stylesim.errors import InputError
 from stylesim.geometry import wrap_angle
-from stylesim.kinematics.smoothing import Smoother, operators
+from stylesim.kinematics.smoothing import Smoother, derivatives
 from stylesim.randomness import stream
 from stylesim.scene import Scene
 
@@ -103,7 +103,10 @@ def _residual_filter(dt_s: float) -> Float64[np.ndarray, " tap"]:
     """One minus the smoother, in the middle of a whole window."""
     smoother = Smoother()
     taps = smoother.taps(dt_s)
-    weights = -operators(smoother, dt_s)[-1, taps // 2, 0, :taps]
+    # The smoother's answer in the middle of a window to a unit in each of its places.
+    impulses = np.eye(taps)[..., None]
+    run = np.zeros((taps, taps), np.int64)
+    weights = -derivatives(impulses, run, dt_s, smoother)[:, taps // 2, 0, 0]
     weights[taps // 2] += 1
     return weights
 
