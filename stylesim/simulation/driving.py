@@ -21,6 +21,7 @@ RESPONSE_SIGMA = 0.26
 DECELERATION_SIGMA = 0.264
 SHORTEST_RESPONSE_S = 0.4  # chosen, because 0.7 s is the 15 % quantile and no observed stop was quicker than about this
 HARDEST_BRAKING_MPS2 = 7.5  # TRID 801675: 821 stops at yellow used 1.51 to 7.47 m/s2
+STANDING_MPS = 0.05  # who is slower stands and stops for sure
 LARGEST_Z = 2.5  # draws are clipped there, because a single driver must not respond after 5 s
 
 
@@ -71,12 +72,13 @@ def decide_at_yellow(
     that leaves more than 7.5 m/s2 to brake, it responds as early as it takes (people who stop close to the line
     do respond earlier), down to 0.4 s; where even that is too late nobody could stop, and it goes [ours].
     """
-    time_to_line_s = distance_m / speed_mps if speed_mps > 0.05 else math.inf
+    standing = speed_mps < STANDING_MPS
+    time_to_line_s = math.inf if standing else distance_m / speed_mps
     chance = stop_probability(time_to_line_s, midpoint_s=style.yellow_midpoint_s, slope_per_s=style.yellow_slope_per_s)
     wants_to_stop = bool(rng.random() < chance)
     response = brake_response(style, rng)
     wish = wished_deceleration(style, rng)
-    if wants_to_stop and speed_mps > 0.0:
+    if wants_to_stop and not standing:
         latest = (distance_m - speed_mps**2 / (2.0 * HARDEST_BRAKING_MPS2)) / speed_mps
         response = min(response, latest)
     if not wants_to_stop or response < SHORTEST_RESPONSE_S:

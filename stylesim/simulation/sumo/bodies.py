@@ -42,7 +42,7 @@ class Bodies:
 
 
 def bodies_of(log: RawLog, files: EpisodeFiles) -> Bodies:
-    """Every row of the log as a body; needs at least one row."""
+    """Every row of the log as a body."""
     order = np.argsort(log.driver, kind="stable")
     driver, step = log.driver[order], log.step[order]
     front, lateral = log.front_m[order], log.lateral_m[order]
@@ -92,7 +92,7 @@ def _offset(
     begin = np.full(len(drivers), np.iinfo(np.int32).max, np.int32)
     np.minimum.at(begin, driver, step)
     frame = step - begin[driver]
-    speed = np.zeros((len(drivers), int(frame.max()) + 1))
+    speed = np.zeros((len(drivers), int(frame.max(initial=0)) + 1))
     speed[driver, frame] = speed_mps
     narrowest = min(lane.width_m for lane in files.network.road.lanes)
     width = np.array([item.width_m for item in drivers])

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Sequence
-from typing import Any, ClassVar, Protocol, cast
+from typing import Any, ClassVar, Protocol, cast, runtime_checkable
 
 from stylesim.errors import MissingDependencyError, SimulationError
 
@@ -12,6 +12,7 @@ SYSTEM_LIBRARIES = "libX11 libXext libXrender libGL libatomic"
 DEBIAN_PACKAGES = "libx11-6 libxext6 libxrender1 libgl1 libatomic1"
 
 
+@runtime_checkable
 class Collision(Protocol):
     """One collision that SUMO reports."""
 
@@ -19,6 +20,7 @@ class Collision(Protocol):
     victim: str
 
 
+@runtime_checkable
 class VehicleApi(Protocol):
     """The part of `libsumo.vehicle` used here."""
 
@@ -33,6 +35,7 @@ class VehicleApi(Protocol):
     def getSpeed(self, vehID: str) -> float: ...  # noqa: D102, N802
 
 
+@runtime_checkable
 class SimulationApi(Protocol):
     """The part of `libsumo.simulation` used here."""
 
@@ -44,6 +47,7 @@ class SimulationApi(Protocol):
     def getEmergencyStoppingVehiclesIDList(self) -> Sequence[str]: ...  # noqa: D102, N802
 
 
+@runtime_checkable
 class VehicleTypeApi(Protocol):
     """The part of `libsumo.vehicletype` used here."""
 
@@ -51,6 +55,7 @@ class VehicleTypeApi(Protocol):
     def setDecel(self, typeID: str, decel: float) -> None: ...  # noqa: D102, N802
 
 
+@runtime_checkable
 class TrafficLightApi(Protocol):
     """The part of `libsumo.trafficlight` used here."""
 
@@ -59,12 +64,14 @@ class TrafficLightApi(Protocol):
     def getNextSwitch(self, tlsID: str) -> float: ...  # noqa: D102, N802
 
 
+@runtime_checkable
 class LaneApi(Protocol):
     """The part of `libsumo.lane` used here."""
 
     def getLastStepVehicleIDs(self, laneID: str) -> Sequence[str]: ...  # noqa: D102, N802
 
 
+@runtime_checkable
 class SumoApi(Protocol):
     """The part of libsumo used here."""
 

@@ -21,7 +21,7 @@ AT_LINE_M = 5.0  # the first in a queue stands this close; chosen, because minGa
 NEAR_LANE_M = 0.6  # beyond half a lane's width, for who is changing lanes
 
 
-def _set(flags: Int32[np.ndarray, " driver"], who: Int64[np.ndarray, " hit"], flag: TrackFlag) -> None:
+def _set(flags: Int32[np.ndarray, " driver"], who: Int32[np.ndarray, " hit"], flag: TrackFlag) -> None:
     np.bitwise_or.at(flags, who, np.int32(flag))
 
 
@@ -64,11 +64,13 @@ def logged_steps(bodies: Bodies, logged: Bool[np.ndarray, " row"], drivers: int)
     """First and last logged step of each driver; (1, 0) for who has none."""
     seen = np.tile(np.array([1, 0], np.int64), (drivers, 1))
     rows = np.flatnonzero(logged)
+    if not len(rows):
+        return seen
     who = bodies.driver[rows]
     new = np.flatnonzero(np.diff(who, prepend=-1))
     seen[who[new], 0] = bodies.step[rows[new]]
     last = np.append(new[1:], len(rows)) - 1
-    seen[who[last], 1] = bodies.step[rows[last]] if len(rows) else seen[who[last], 1]
+    seen[who[last], 1] = bodies.step[rows[last]]
     return seen
 
 

@@ -14,7 +14,6 @@ from stylesim.simulation.sumo.events import flags_of
 from stylesim.simulation.sumo.recorder import RawLog
 from stylesim.simulation.sumo.signals import signal_log
 from stylesim.simulation.sumo.yellow import DecisionEvent
-from stylesim.style import STYLE_CLASSES
 from stylesim.tracks import TrackFlag, Tracks
 
 SETTLING_S = 3.0  # after insertion, not logged: SUMO's vehicles find their speed and lane in that time
@@ -102,14 +101,13 @@ def _dense(
 
 
 def _counts(tracks: Tracks, log: RawLog, warm: int) -> dict[str, int]:
-    """Flags by name (tracks that carry them), collisions by pair, and drivers by style."""
+    """Flags by name (tracks that carry them), and collisions by pair."""
     names = {flag.name.lower(): flag for flag in TrackFlag if flag.name is not None}
     outcomes = ("emergency_braked", "ran_red", "teleported", "removed", "collided")
     answers = ("decided_stop", "decided_go", "stopped_at_line", "crossed_on_yellow")
     counts = {name: int(tracks.flagged(names[name]).sum()) for name in outcomes + answers}
     counts["collisions"] = len({tuple(sorted(pair)) for step, *pair in log.collisions if step >= warm})
-    styles = [style.name for style in tracks.driver if style is not None]
-    return counts | {f"style_{name}": styles.count(name) for name in STYLE_CLASSES}
+    return counts
 
 
 def _overlap_counts(

@@ -36,10 +36,13 @@ class Driver:
 
 
 def draw_body(*, truck: bool, rng: np.random.Generator) -> tuple[AgentKind, float, float]:
-    """Kind, length and width in m: cars 3.8-5.0 x 1.65-1.95, trucks 7.5-16.5 x 2.4-2.55 (European classes) [ours]."""
+    """Kind, length and width in m: cars 3.8-5.0 x 1.65-1.95, trucks 6-11 x 2.3-2.55 [ours].
+
+    Trucks are rigid ones: an articulated lorry is no box, as one of 15 m it would sweep over the lanes beside a turn.
+    """
     share = rng.random(2)
     if truck:
-        return AgentKind.TRUCK, round(7.5 + 9.0 * float(share[0]), 2), round(2.4 + 0.15 * float(share[1]), 2)
+        return AgentKind.TRUCK, round(6.0 + 5.0 * float(share[0]), 2), round(2.3 + 0.25 * float(share[1]), 2)
     return AgentKind.CAR, round(3.8 + 1.2 * float(share[0]), 2), round(1.65 + 0.3 * float(share[1]), 2)
 
 
