@@ -1,4 +1,9 @@
-"""Intervals that respect who the data came from: units first, then drivers (REFERENCE section 8)."""
+"""Intervals that respect who the data came from: units first, then drivers (REFERENCE section 8).
+
+Measured coverage of the 95 % interval for exponential errors (sd 1) with a unit effect of sd 0.5, 300 trials: 83 % with
+3 units, 89 % with 5, 97 to 98 % from 10 units on. So with fewer than about 10 units a "general" interval is somewhat
+too narrow: a percentile bootstrap cannot see variation between units that it has not been shown.
+"""
 
 from __future__ import annotations
 

@@ -17,7 +17,7 @@ STANDING = "standing"  # `by` of the cell that holds the agents that stand in th
 CROSS = " × "
 
 _ORDER = {name: i for i, name in enumerate((*STYLE_CLASSES, "normal", "neutral"))}
-_LAST = ("undetermined", "unlabelled", "not commanded")
+LAST = ("undetermined", "unlabelled", "not commanded")
 
 
 @dataclass(frozen=True)
@@ -49,7 +49,7 @@ class Slice:
 def value_order(value: str) -> tuple[tuple[int, str], ...]:
     """Sorting key: classes from aggressive to timid, then other names, then what could not be judged."""
     return tuple(
-        (len(_ORDER) + 1 + _LAST.index(part) if part in _LAST else _ORDER.get(part, len(_ORDER)), part)
+        (len(_ORDER) + 1 + LAST.index(part) if part in LAST else _ORDER.get(part, len(_ORDER)), part)
         for part in value.split(CROSS)
     )
 

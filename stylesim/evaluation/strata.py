@@ -18,7 +18,7 @@ def column_of(stratum: str) -> str:
     if stratum in PLAIN:
         return stratum
     kind, _, method = stratum.rpartition(":")
-    return f"style_cond_{method}" if kind == "history" else f"style_strat_{stratum.replace(':', '_')}"
+    return f"style_cond_{method}" if kind == "history" else f"style_strat_{stratum.replace(':', '.')}"
 
 
 def parts_of(by: str) -> tuple[str, ...]:

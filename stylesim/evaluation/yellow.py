@@ -35,16 +35,15 @@ class YellowDecisions:
         return len(self.style)
 
 
-def _time_to_line(scene: Scene, agent: int, frame: int, lane: Lane) -> float | None:
-    """Seconds from the front bumper to the lane's stop line at its present speed; None where not on that lane."""
+def _metres_to_line(scene: Scene, agent: int, frame: int, lane: Lane) -> float | None:
+    """From the front bumper to the lane's stop line; None where it is not on that lane, or past the line."""
     tracks = scene.tracks
-    speed = float(tracks.speed_mps[agent, frame])
-    if lane.stop_line_m is None or speed < MIN_SPEED_MPS:
+    if lane.stop_line_m is None:
         return None
     along, _, distance, _ = project(tracks.position_m[agent, frame][None], lane.centre_line_m)
     line_at, _, _, _ = project(lane.stop_line_m.mean(axis=0)[None], lane.centre_line_m)
     ahead = float(line_at[0] - along[0]) - float(np.nan_to_num(tracks.size_m[agent, 0])) / 2
-    return ahead / speed if distance[0] <= LANE_REACH_M and ahead > 0 else None
+    return ahead if distance[0] <= LANE_REACH_M and ahead > 0 else None
 
 
 def _onsets(scene: Scene) -> list[tuple[int, tuple[str, ...]]]:
@@ -55,16 +54,23 @@ def _onsets(scene: Scene) -> list[tuple[int, tuple[str, ...]]]:
     return [(int(frame) + 1, scene.signals.lane_id[light]) for light, frame in np.argwhere(changed)]
 
 
-def _decision(scene: Scene, agent: int, lanes: dict[str, Lane]) -> float | None:
-    """The time to the stop line at the one onset at which this driver was nearest to deciding."""
-    times = [
-        time
+def _decision(scene: Scene, agent: int, lanes: dict[str, Lane], counts: Counter[str]) -> float | None:
+    """The time to the stop line at the onset at which this driver was nearest to it; None, counted, without one."""
+    speed = scene.tracks.speed_mps[agent]
+    seen = [
+        (ahead, float(speed[frame]))
         for frame, ids in _onsets(scene)
         if scene.tracks.valid[agent, frame]
         for lane_id in ids
-        if lane_id in lanes and (time := _time_to_line(scene, agent, frame, lanes[lane_id])) is not None
+        if lane_id in lanes and (ahead := _metres_to_line(scene, agent, frame, lanes[lane_id])) is not None
     ]
-    return min(times) if times and min(times) <= MAX_TTS_S else None
+    moving = [ahead / v for ahead, v in seen if v >= MIN_SPEED_MPS]
+    if moving and min(moving) <= MAX_TTS_S:
+        return min(moving)
+    slow = f"slower than {MIN_SPEED_MPS:g} m/s at the onset"
+    far = f"more than {MAX_TTS_S:g} s from the line"
+    counts[far if moving else slow if seen else "not on a controlled lane at the onset"] += 1
+    return None
 
 
 def yellow_decisions(corpus: Corpus) -> YellowDecisions | None:
@@ -84,12 +90,12 @@ def yellow_decisions(corpus: Corpus) -> YellowDecisions | None:
             continue
         lanes = {lane.lane_id: lane for lane in scene.road.lanes}
         for agent in deciders:
-            driver, time = scene.tracks.driver[agent], None
+            driver = scene.tracks.driver[agent]
             if stop[agent] and go[agent]:
-                counts["decided more than once"] += 1
-            elif driver is None or (time := _decision(scene, agent, lanes)) is None:
-                counts["not on a controlled lane at the onset"] += 1
-            else:
+                counts["decided both ways"] += 1
+            elif driver is None:
+                counts["not commanded"] += 1
+            elif (time := _decision(scene, agent, lanes, counts)) is not None:
                 rows.append((time, bool(stop[agent]), driver.name, scene.unit_id))
     if not rows:
         return None

@@ -1,80 +1,99 @@
-"""`stylesim.evaluate`: one or several forecasters on one corpus, and the report of it."""
+"""`stylesim.evaluate`: one or several forecasters on one corpus, with everything that the report needs."""
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 
 from stylesim.corpus import Corpus
 from stylesim.errors import InputError
-from stylesim.evaluation.evaluate import evaluate as evaluate_one
+from stylesim.evaluation import evaluate as one_forecaster
+from stylesim.evaluation.metrics import MODES
 from stylesim.evaluation.results import Evaluation, markdown
 from stylesim.forecast import Forecaster
 from stylesim.report.figures import Curve
+from stylesim.report.html import build_report
 from stylesim.windows import WindowSpec
 
 
 @dataclass(frozen=True, eq=False)
 class Report:
-    """The evaluations of several forecasters on one corpus, in the order in which they were given."""
+    """Evaluations of several forecasters on one corpus; the first is the baseline of the paired differences."""
 
     evaluations: tuple[Evaluation, ...]
-    corpora: tuple[Corpus, ...]
-    training_curves: Mapping[str, Curve] = field(default_factory=dict)
+    corpus: Corpus
+    training_curves: Mapping[str, Curve]
+    seed: int
 
     def save(self, path: str | Path) -> Path:
-        """Write the HTML page to `path`, and JSON, Markdown and Parquet of each evaluation beside it.
+        """Write the HTML page to `path`, and .json, .md, .parquet of each forecaster beside it; returns the page.
 
-        Returns the path of the page. InputError if `path` does not end in .html.
+        InputError unless `path` ends in .html.
         """
-        from stylesim.report.html import build_report
-
         page = Path(path)
         if page.suffix != ".html":
             raise InputError(f"{page}: a report is an .html file")
-        for one in self.evaluations:
-            one.save(page.with_name(f"{page.stem}.{one.forecaster}"))
+        for evaluation, name in zip(self.evaluations, file_names(self.evaluations), strict=True):
+            evaluation.save(page.parent / name)
+        curves = self.training_curves
         return build_report(
-            page, evaluations=self.evaluations, corpora=self.corpora, training_curves=self.training_curves
+            page, evaluations=self.evaluations, corpora=[self.corpus], training_curves=curves, seed=self.seed
         )
 
-    def to_markdown(self) -> str:
-        """Every evaluation's tables."""
-        return "\n".join(markdown(one) for one in self.evaluations)
-
     def _repr_markdown_(self) -> str:
-        return self.to_markdown()
+        """What a notebook shows."""
+        return "\n".join(markdown(evaluation) for evaluation in self.evaluations)
+
+
+def file_names(evaluations: Sequence[Evaluation]) -> list[str]:
+    """A file name for each forecaster: plain characters only, no two alike."""
+    names: list[str] = []
+    for evaluation in evaluations:
+        plain = re.sub(r"[^A-Za-z0-9_-]+", "-", evaluation.forecaster).strip("-") or "forecaster"
+        taken = sum(name == plain or name.startswith(f"{plain}-no") for name in names)
+        names.append(f"{plain}-no{taken + 1}" if taken else plain)
+    return names
 
 
 def evaluate(
     forecasters: Forecaster | Sequence[Forecaster],
     corpus: Corpus,
     *,
-    by: tuple[str, ...] = ("tdbm",),
+    by: Sequence[str] = ("tdbm",),
     spec: WindowSpec | None = None,
+    split: str | None = None,
     seed: int = 0,
+    modes: int = MODES,
+    within_site: bool = True,
     progress: Callable[[str, int, int], None] | None = None,
 ) -> Report:
-    """Errors per driver and per cell of `by` (see `stylesim.evaluation.evaluate`) of one or several forecasters.
+    """Errors of every forecaster by style and scenario; see `stylesim.evaluation.evaluate` for `by` and what is raised.
 
-    `corpus` may be a view such as `corpus.split("test")`. The first forecaster is the baseline that the others are
-    paired with. `progress` is called with (forecaster's name, done, total). InputError as in
-    `stylesim.evaluation.evaluate`, or if two forecasters have one name.
+    A forecaster that has `training_curve` brings its loss curve into the report. `progress` is called with the
+    forecaster's name, the scenes done and their number. InputError if there is none, or two have one name.
     """
-    asked = list(forecasters) if isinstance(forecasters, Sequence) else [forecasters]
-    names = [one.name for one in asked]
+    several = list(forecasters) if isinstance(forecasters, Sequence) else [forecasters]
+    names = [forecaster.name for forecaster in several]
+    if not several:
+        raise InputError("there is no forecaster to evaluate")
     if len(set(names)) < len(names):
-        raise InputError(f"two forecasters have one name: {', '.join(names)}")
-    evaluations, curves = [], {}
-    for one in asked:
-
-        def tell(done: int, total: int, name: str = one.name) -> None:
-            if progress is not None:
-                progress(name, done, total)
-
-        evaluations.append(evaluate_one(one, corpus, by=tuple(by), spec=spec, seed=seed, progress=tell))
-        curve = getattr(one, "training_curve", None)
-        if curve:
-            curves[one.name] = curve
-    return Report(tuple(evaluations), (corpus,), curves)
+        raise InputError(f"two forecasters have the same name: {', '.join(names)}")
+    view = corpus if split is None else corpus.split(split)
+    evaluations = tuple(
+        one_forecaster.evaluate(
+            forecaster,
+            view,
+            by=tuple(by),
+            spec=spec,
+            seed=seed,
+            modes=modes,
+            within_site=within_site,
+            progress=None if progress is None else partial(progress, forecaster.name),
+        )
+        for forecaster in several
+    )
+    curves = {forecaster.name: getattr(forecaster, "training_curve", ()) for forecaster in several}
+    return Report(evaluations, view, {name: curve for name, curve in curves.items() if curve}, seed)

@@ -12,9 +12,11 @@ from matplotlib.ticker import MaxNLocator
 from stylesim.evaluation.results import HEADINGS, Evaluation
 from stylesim.evaluation.slices import Slice, value_order
 from stylesim.evaluation.strata import title_of
-from stylesim.report.theme import SERIES_COLOUR, SERIES_MARKER, drawing, new_figure
+from stylesim.report.theme import SERIES_COLOUR, SERIES_MARKER, drawing, new_figure, plural
 
-Curve = Sequence[Mapping[str, int | float | None]]  # records with epoch, train_loss, val_loss, val_min_fde_m
+Curve = Sequence[
+    Mapping[str, int | float | None]
+]  # records with epoch, train_loss, val_loss, val_min_fde_m (or min_fde_m)
 WIDTH = 8.6  # inches; the page's column
 MOST_UPRIGHT = 8  # chosen: more names do not fit beside one another
 MOST_CELLS = 40  # chosen: above it a figure of cells cannot be read and the table has to do
@@ -29,7 +31,7 @@ def _tick(cells: Sequence[Slice], value: str, *, upright: bool) -> str:
     """The value with the n of its largest cell; forecasters on one corpus share it."""
     size = max((c.size for c in cells if c.value == value), key=lambda s: s.n_drivers)
     between = "\n" if upright else ", "
-    return between.join([f"{value}\nn = {size.n_drivers}", f"{size.n_units} units"])
+    return between.join([f"{value}\nn = {size.n_drivers}", plural(size.n_units, "unit")])
 
 
 def _series(
@@ -98,7 +100,7 @@ def error_figure(evaluations: Sequence[Evaluation], by: str, *, metric: str = "m
 
 def finite_pairs(curve: Curve, name: str) -> tuple[list[float], list[float]]:
     """(epochs, values) of one quantity of a training record, where it was measured."""
-    found = [(point.get("epoch"), point.get(name)) for point in curve]
+    found = [(point.get("epoch"), point.get(name, point.get(name.removeprefix("val_")))) for point in curve]
     pairs = [(float(e), float(v)) for e, v in found if e is not None and v is not None and np.isfinite(v)]
     return [epoch for epoch, _ in pairs], [value for _, value in pairs]
 

@@ -11,15 +11,15 @@ from stylesim.corpus import Corpus
 from stylesim.corpus.files import write_whole
 from stylesim.errors import InputError
 from stylesim.evaluation.results import Evaluation
+from stylesim.report import data_sections as data
 from stylesim.report import sections as parts
+from stylesim.report.blocks import Section
 from stylesim.report.figures import Curve
 
 METHODS = ("tdbm", "kdsc")
 
 
-def render(
-    title: str, lead: str, sections: Sequence[parts.Section], warnings: Sequence[str], findings: Sequence[str]
-) -> str:
+def render(title: str, lead: str, sections: Sequence[Section], warnings: Sequence[str], findings: Sequence[str]) -> str:
     """The page. Everything is escaped; the page forbids itself to load anything (Content-Security-Policy)."""
     loader = FileSystemLoader(Path(__file__).parent)
     environment = Environment(loader=loader, autoescape=True, undefined=StrictUndefined, trim_blocks=True)
@@ -57,10 +57,10 @@ def build_report(
         raise InputError(f"two evaluations have the same forecaster name: {', '.join(sorted(names))}")
     found = [
         parts.errors_section(evaluations, seed=seed) if evaluations else None,
-        parts.labels_section(corpora, methods),
-        parts.yellow_section(corpora),
+        data.labels_section(corpora, methods),
+        data.yellow_section(corpora),
         parts.training_section(curves),
-        parts.scenes_section(corpora, methods, example_scenes),
+        data.scenes_section(corpora, methods, example_scenes),
         parts.provenance_section(evaluations, corpora),
     ]
     sections = [section for section in found if section is not None]

@@ -3,23 +3,26 @@
 from __future__ import annotations
 
 from collections import Counter
-from typing import Literal
+from pathlib import Path
 
 import numpy as np
-from jaxtyping import Bool, Float64
+from jaxtyping import Bool, Float32, Float64
 from matplotlib.axes import Axes
 from matplotlib.collections import LineCollection, PolyCollection
 from matplotlib.figure import Figure
 
+from stylesim.corpus.files import write_whole
+from stylesim.errors import InputError
 from stylesim.evaluation.slices import value_order
 from stylesim.geometry import box_corners
 from stylesim.labels import StyleLabels
-from stylesim.report.theme import FAINT, INK, SURFACE, drawing, style_colour
+from stylesim.report.theme import FAINT, INK, SURFACE, drawing, figure_bytes, style_colour
 from stylesim.road import Lane, Road
 from stylesim.scene import Scene
 
 WINDOW_S = 11.0  # the window of a track label (REFERENCE section 1)
 DOT_S = 0.1
+VIEW_M = 240.0  # chosen: on a page 22 cm wide a car of 4.5 m is then 4 mm long
 MARGIN_M = 12.0  # chosen: some road around the tracks
 WIDTH = 8.6
 
@@ -83,17 +86,32 @@ def _draw_tracks(axes: Axes, scene: Scene, styles: tuple[str, ...], shown: Bool[
         )
 
 
+def _extent(
+    points_m: Float32[np.ndarray, "dot 2"], view_m: float | None
+) -> tuple[Float64[np.ndarray, " 2"], Float64[np.ndarray, " 2"]]:
+    """Lower left and upper right corner of what is shown."""
+    if not len(points_m):
+        return np.zeros(2), np.ones(2)
+    points = points_m.astype(np.float64)
+    low, high = points.min(axis=0) - MARGIN_M, points.max(axis=0) + MARGIN_M
+    if view_m is None:
+        return low, high
+    middle = np.median(points, axis=0)
+    return np.maximum(low, middle - view_m / 2), np.minimum(high, middle + view_m / 2)
+
+
 def scene_figure(
     scene: Scene,
     labels: StyleLabels | None = None,
     *,
     frames: tuple[int, int] | None = None,
-    legend: Literal["measured", "commanded"] | None = None,
+    view_m: float | None = VIEW_M,
 ) -> Figure:
     """The tracks of `frames` (by default the busiest 11 s) on the road, coloured by class.
 
     Colours are the labelled class, or the commanded one where `labels` is None. Boxes stand where a road user is last
-    seen in the window. `legend` overrides what the title calls the colours. ValueError where no frame is in `frames`.
+    seen. At most `view_m` metres a side are shown, around the middle of the traffic; None shows everything. n counts
+    the road users in view. ValueError where `frames` are not the scene's.
     """
     tracks = scene.tracks
     first, stop = frames or busiest_frames(scene)
@@ -103,10 +121,9 @@ def scene_figure(
     shown = np.zeros_like(tracks.valid)
     shown[:, first:stop:every] = tracks.valid[:, first:stop:every]
     styles = agent_styles(scene, labels)
-    seen = Counter(style for style, any_ in zip(styles, np.asarray(shown.any(axis=1)).tolist(), strict=True) if any_)
-    points = tracks.position_m[shown]
-    low, high = (points.min(axis=0), points.max(axis=0)) if len(points) else (np.zeros(2), np.ones(2))
-    low, high = low - MARGIN_M, high + MARGIN_M
+    low, high = _extent(tracks.position_m[shown], view_m)
+    shown &= ((tracks.position_m >= low) & (tracks.position_m <= high)).all(axis=2)
+    seen = Counter(styles[agent] for agent in np.flatnonzero(shown.any(axis=1)))
     span = high - low
     with drawing():
         height = float(np.clip(WIDTH * 0.92 * span[1] / span[0] + 1.2, 2.0, 8.5))
@@ -123,9 +140,20 @@ def scene_figure(
         axes.grid(visible=False)
         axes.set_xlabel("x, east (m)")
         axes.set_ylabel("y, north (m)")
-        colour = legend or ("commanded" if labels is None else "measured")
-        what = f"{labels.method.upper()} class" if labels is not None else "class"
+        colour = "commanded class" if labels is None else f"measured {labels.method.upper()} class"
         seconds = (stop - first) * tracks.dt_s
-        axes.set_title(f"{scene.scene_id}: {seconds:.0f} s of traffic, one dot per {DOT_S:g} s, by {colour} {what}")
+        title = f"{scene.scene_id}\n{seconds:.0f} s of traffic, one dot per {DOT_S:g} s, by {colour}"
+        figure.suptitle(title, x=0.01, ha="left", size=10, weight="bold")
         figure.legend(loc="outside lower center", ncols=5)
     return figure
+
+
+def save_picture(
+    scene: Scene, path: str | Path, *, labels: StyleLabels | None = None, frames: tuple[int, int] | None = None
+) -> Path:
+    """`scene_figure` as a .png or .svg file, whole or not at all; returns its path. InputError for another ending."""
+    out = Path(path)
+    if out.suffix not in (".png", ".svg"):
+        raise InputError(f"{out}: a picture ends in .png or .svg")
+    write_whole(out, figure_bytes(scene_figure(scene, labels, frames=frames), raster=out.suffix == ".png"))
+    return out

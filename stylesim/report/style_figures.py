@@ -10,14 +10,14 @@ from matplotlib.figure import Figure
 from scipy.special import expit
 
 from stylesim.evaluation.label_summary import RANK_CEILING, LabelSummary, SourceSummary
-from stylesim.evaluation.yellow import YellowDecisions
+from stylesim.evaluation.yellow import MAX_TTS_S, YellowDecisions
 from stylesim.report.theme import SERIES_COLOUR, UNJUDGED_COLOUR, drawing, new_figure, style_colour, style_marker
 from stylesim.style import STYLE_CLASSES
 
 WIDTH = 8.6
 NEUTRAL_YELLOW = (2.14, 2.88)  # (k 1/s, m s), REFERENCE section 5: Rakha et al. 2007, drivers under 40
-YELLOW_BIN_S = 1.0  # chosen: six styles share the decisions, narrower bins would hold too few
-MIN_BIN = 10  # chosen: a share of fewer decisions than this is not drawn
+PER_POINT = 12  # chosen: decisions behind one point at least; a share of fewer says nothing
+MOST_POINTS = 8  # chosen: more points of one style hide the others
 
 
 def _share_panel(axes: Axes, sources: Sequence[tuple[str, SourceSummary]], title: str, *, transposed: bool) -> None:
@@ -106,25 +106,23 @@ def rank_note(summary: LabelSummary) -> str:
 def stop_probability_figure(decisions: YellowDecisions) -> Figure:
     """Share of drivers that decided to stop, by time to the stop line at the onset of yellow and commanded style."""
     k, m = NEUTRAL_YELLOW
-    edges = np.arange(0.0, 8.0 + YELLOW_BIN_S, YELLOW_BIN_S)
     style = np.array(decisions.style, dtype=object)
     with drawing():
         figure, (axes,) = new_figure(WIDTH, 3.6)
-        fine = np.linspace(0, 8, 200)
+        fine = np.linspace(0, MAX_TTS_S, 200)
         neutral = f"neutral driver of the literature (k = {k} 1/s, m = {m} s)"
         axes.plot(fine, expit(k * (fine - m)), color=UNJUDGED_COLOUR, ls="--", lw=1.4, label=neutral)
         for name in [c for c in (*STYLE_CLASSES, "neutral") if (style == c).any()]:
             tts, stopped = decisions.tts_s[style == name], decisions.stopped[style == name]
-            where = np.digitize(tts, edges) - 1
-            bins = [b for b in range(len(edges) - 1) if (where == b).sum() >= MIN_BIN]
-            middle = [tts[where == b].mean() for b in bins]
-            share = [stopped[where == b].mean() for b in bins]
+            groups = np.array_split(np.argsort(tts, kind="stable"), min(MOST_POINTS, max(1, len(tts) // PER_POINT)))
+            drawn = [group for group in groups if len(group) >= PER_POINT]
+            middle, share = [tts[group].mean() for group in drawn], [stopped[group].mean() for group in drawn]
             label = f"{name}, n = {len(tts)}"
             axes.plot(middle, share, style_marker(name) + "-", color=style_colour(name), ms=5.5, lw=1.3, label=label)
-        axes.set_xlim(0, 8)
+        axes.set_xlim(0, MAX_TTS_S)
         axes.set_ylim(-0.03, 1.03)
         axes.set_xlabel("time to the stop line at the onset of yellow (s)")
         axes.set_ylabel("share that decides to stop")
-        axes.set_title(f"Stop or go at the yellow by commanded style ({YELLOW_BIN_S:g} s bins of {MIN_BIN} or more)")
+        axes.set_title(f"Stop or go at the yellow by commanded style, each point {PER_POINT} decisions or more")
         figure.legend(loc="outside lower center", ncols=4)
     return figure

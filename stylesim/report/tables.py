@@ -14,6 +14,7 @@ from stylesim.evaluation.results import HEADINGS, Evaluation
 from stylesim.evaluation.slices import ALL, STANDING, Slice, value_order
 from stylesim.evaluation.strata import title_of
 from stylesim.report.figures import cell_values
+from stylesim.report.theme import plural
 
 EM = "–"
 
@@ -43,15 +44,24 @@ def number(value: float, digits: int) -> str:
     return text.lstrip("-") if float(text) == 0.0 else text.replace("-", "−")
 
 
+def size_text(size: Estimate) -> str:
+    """How many drivers of how many units, and whether the interval is of this site only."""
+    mark = ", † within site" if size.status == "within site" else ""
+    return f"{plural(size.n_drivers, 'driver')}, {plural(size.n_units, 'unit')}{mark}"
+
+
 def estimate_cell(value: Estimate | None, *, judge: bool = False, digits: int = 2) -> Cell:
-    """`1.63` over `[1.20, 2.10]`; "too few" where refused. `judge` marks intervals that exclude 0."""
+    """`1.63` over `[1.20, 2.10]`; "too few" where refused, † where within site.
+
+    `judge` marks intervals that exclude 0.
+    """
     if value is None:
         return Cell(EM, look="refused")
     if value.refused:
         return Cell("too few", look="refused")
     note = f"[{number(value.low, digits)}, {number(value.high, digits)}]"
     if value.status == "within site":
-        return Cell(number(value.value, digits), f"{note} within site", "within")
+        return Cell(number(value.value, digits), f"{note} †", "within")
     look = ("better" if value.high < 0 else "worse") if judge and value.excludes_zero else "number"
     return Cell(number(value.value, digits), note, look)
 
@@ -71,7 +81,7 @@ def error_table(evaluations: Sequence[Evaluation], by: str) -> Table:
         present = [(name, cells[value]) for name, cells in found if value in cells]
         sizes = {(item.size.n_drivers, item.size.n_units) for _, item in present}
         for place, (name, item) in enumerate(present):
-            n = f"{item.size.n_drivers} drivers, {item.size.n_units} units"
+            n = size_text(item.size)
             lead = (
                 []
                 if place
@@ -107,7 +117,7 @@ def difference_table(evaluations: Sequence[Evaluation], by: str, *, seed: int) -
     for value in sorted({value for _, cells in found for value in cells}, key=value_order):
         for place, (name, cells) in enumerate(found):
             size = cells[value][METRICS[0]]
-            n = f"{size.n_drivers} drivers, {size.n_units} units"
+            n = size_text(size)
             lead = [] if place else [Cell(value.replace(ALL, "all drivers"), n, "head", len(found))]
             rows.append(
                 (*lead, Cell(name), *(estimate_cell(cells[value][metric], judge=True, digits=3) for metric in METRICS))
@@ -134,7 +144,7 @@ def label_table(summaries: Sequence[LabelSummary]) -> Table:
                 (
                     Cell(one.source, summary.corpus, "head"),
                     Cell(summary.method),
-                    Cell(f"{one.n}", f"{one.n_units} units", "number"),
+                    Cell(f"{one.n}", plural(one.n_units, "unit"), "number"),
                     percent(one.share("undetermined")),
                     percent(one.no_neighbours),
                     percent(one.no_leader),
@@ -145,7 +155,7 @@ def label_table(summaries: Sequence[LabelSummary]) -> Table:
             )
     headings = ("source", "method", "tracks", "undetermined", "no neighbours", "no leader", "a feature clamped")
     margins = ("margin, median and quartiles", f"margin under {FRAGILE_MARGIN}")
-    caption = "Labels of whole tracks. The margin is the best score minus the second best: under it a label is fragile."
+    caption = "Labels of whole tracks. The margin is the best score minus the second best: in the method's own units."
     return Table(caption, (*headings, *margins), tuple(rows))
 
 

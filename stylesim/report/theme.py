@@ -95,14 +95,23 @@ def style_marker(name: str) -> str:
     return STYLE_MARKER.get(name, "x")
 
 
-def data_uri(figure: Figure, *, raster: bool = False) -> str:
-    """The figure as a `data:` address for an <img>: SVG, or PNG where it has thousands of dots; deterministic."""
+def plural(count: int, noun: str) -> str:
+    """`1 unit`, `2 units`."""
+    return f"{count} {noun}" + ("" if count == 1 else "s")
+
+
+def figure_bytes(figure: Figure, *, raster: bool = False) -> bytes:
+    """The figure as SVG, or as PNG (`raster`) where it has thousands of dots; deterministic."""
     buffer = io.BytesIO()
     with drawing():
         if raster:
             figure.savefig(buffer, format="png", dpi=160, metadata={"Software": None})
-            kind = "image/png"
         else:
             figure.savefig(buffer, format="svg", metadata={"Date": None, "Creator": None, "Format": None, "Type": None})
-            kind = "image/svg+xml"
-    return f"data:{kind};base64,{base64.b64encode(buffer.getvalue()).decode('ascii')}"
+    return buffer.getvalue()
+
+
+def data_uri(figure: Figure, *, raster: bool = False) -> str:
+    """The figure as a `data:` address for an <img>."""
+    kind = "image/png" if raster else "image/svg+xml"
+    return f"data:{kind};base64,{base64.b64encode(figure_bytes(figure, raster=raster)).decode('ascii')}"

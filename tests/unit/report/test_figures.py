@@ -48,7 +48,7 @@ def test_a_scene_without_road_or_labels_is_drawn(world):
     from dataclasses import replace
 
     scene = replace(world.scene(1), road=None)
-    assert "commanded class" in scene_figure(scene).axes[0].get_title("left")
+    assert "commanded class" in scene_figure(scene).get_suptitle()
     with pytest.raises(ValueError, match="frames"):
         scene_figure(scene, frames=(0, 10_000))
 
