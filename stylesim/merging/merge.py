@@ -122,14 +122,16 @@ def _plan(
 ) -> _Plan:
     infos = [(number, info) for number, corpus in enumerate(inputs) for info in corpus.info]
     splits = plan_splits(infos, shares=split, seed=seed, guard_s=spec.history_s + spec.future_s)
+    dropped = _second_blocks(inputs, splits)
     often = Counter(info.scene_id for _, info in infos)
     new_id = {
         (number, info.scene_id): info.scene_id if often[info.scene_id] == 1 else f"c{number}-{info.scene_id}"
         for number, info in infos
         if (number, info.scene_id) in splits.split
+        and len(dropped.get((number, info.scene_id), {})) < max(1, info.n_agents)
     }
     models = train_noise(inputs, splits) if noise else ()
-    return _Plan(inputs, splits, new_id, _second_blocks(inputs, splits), models, seed)
+    return _Plan(inputs, splits, new_id, dropped, models, seed)
 
 
 def _second_blocks(inputs: Sequence[Corpus], splits: SplitPlan) -> dict[SceneKey, dict[str, int]]:
@@ -202,6 +204,7 @@ def _counts(plan: _Plan) -> dict[str, int]:
     return {
         "scenes_in_guard_gaps": len(plan.splits.guarded),
         "tracks_taken_out_of_a_second_block": sum(len(agents) for agents in plan.dropped.values()),
+        "scenes_without_an_agent_left": len(plan.splits.split) - len(plan.new_id),
         "steps_in": sum(info.n_steps for _, info in infos),
         "steps_in_guard_gaps": sum(info.n_steps for key, info in infos if key in plan.splits.guarded),
         "steps_taken_out": sum(sum(agents.values()) for agents in plan.dropped.values()),

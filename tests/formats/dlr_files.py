@@ -6,31 +6,13 @@ import gzip
 from datetime import UTC, datetime, timedelta
 from pathlib import Path
 
-COLUMNS = tuple(
-    [
-        "timestamp",
-        "id",
-        "center_easting",
-        "center_northing",
-        "velocity_easting",
-        "velocity_northing",
-        "velocity_magnitude",
-        "acceleration_easting",
-        "acceleration_northing",
-        "acceleration_magnitude",
-        "yaw",
-        "dimension_length",
-        "dimension_width",
-        "dimension_height",
-        "classifications_pedestrian",
-        "classifications_bicycle",
-        "classifications_motorbike",
-        "classifications_car",
-        "classifications_van",
-        "classifications_truck",
-        "interpolated",
-    ]
+HEADER = (
+    "timestamp,id,center_easting,center_northing,velocity_easting,velocity_northing,velocity_magnitude,"
+    "acceleration_easting,acceleration_northing,acceleration_magnitude,yaw,dimension_length,dimension_width,"
+    "dimension_height,classifications_pedestrian,classifications_bicycle,classifications_motorbike,"
+    "classifications_car,classifications_van,classifications_truck,interpolated"
 )
+COLUMNS = tuple(HEADER.split(","))
 BEGIN = datetime(2023, 9, 24, 12, 0, 0, tzinfo=UTC)
 STAMP = "230924-120000_230924-120100"
 ORIGIN = (700000.0, 5700000.0)  # far from the site whose road is shipped
