@@ -71,10 +71,9 @@ def test_every_section_is_there_with_its_numbers(page, evaluations):
 
 
 def test_same_input_same_bytes(evaluations, hostile_corpus, tmp_path):
-    pages = [
-        build_report(tmp_path / f"{i}.html", evaluations=evaluations, corpora=[hostile_corpus], training_curves=CURVES)
-        for i in range(2)
-    ]
+    part = hostile_corpus.with_info(hostile_corpus.info[:3])
+    given = {"evaluations": evaluations[:1], "corpora": [part], "training_curves": CURVES}
+    pages = [build_report(tmp_path / f"{i}.html", **given) for i in range(2)]
     assert pages[0].read_bytes() == pages[1].read_bytes()
 
 
