@@ -43,13 +43,17 @@ class DriverTable:
     _limit: int = 2**64
 
     def add(self, scene: Scene, rows: DriverRows) -> None:
-        """Count the rows of a scene: full windows only; a gap without leaders or neighbours is not an observation."""
+        """Count the rows of a scene: full windows only; a gap without leaders or neighbours is not an observation.
+
+        Implausible rows (`LabelFlag.IMPLAUSIBLE`) do not count: three of 126 drivers at one recorded site, with a
+        jumping position, made up a cluster of their own [ours].
+        """
         value = rows.value.copy()
         value[rows.flagged(LabelFlag.NO_LEADER), FEATURES.index("s_front")] = np.nan
         value[rows.flagged(LabelFlag.NO_NEIGHBOURS), FEATURES.index("v_nei")] = np.nan
         highway = rows.flagged(LabelFlag.HIGHWAY)
         value = np.column_stack([value, highway])
-        value[rows.flagged(LabelFlag.SHORT)] = np.nan
+        value[rows.flagged(LabelFlag.SHORT | LabelFlag.IMPLAUSIBLE)] = np.nan
         known = np.isfinite(value)
         sums = np.stack([np.where(known, value, 0.0), known.astype(np.float64)], axis=1)
         for i in np.flatnonzero(known.any(axis=1)):

@@ -6,6 +6,7 @@ import json
 from collections.abc import Iterable, Sequence
 from pathlib import Path
 
+from stylesim.corpus.files import json_bytes, write_whole
 from stylesim.errors import InputError, unknown
 from stylesim.labelers.base import Labeler, Progress
 from stylesim.labelers.kdsc import KDSC
@@ -61,11 +62,7 @@ def load_labeler(path: Path) -> TDBM | KDSC:
 
 def save_labeler(labeler: Labeler, path: Path) -> None:
     """Write a fitted labeller as JSON, whole or not at all; numbers survive exactly."""
-    text = json.dumps(labeler.to_dict(), indent=1, sort_keys=True, allow_nan=False) + "\n"
-    path.parent.mkdir(parents=True, exist_ok=True)
-    partial = path.with_name(path.name + ".partial")
-    partial.write_text(text, encoding="utf-8")
-    partial.replace(path)
+    write_whole(path, json_bytes(labeler.to_dict()))
 
 
 def fit_reference(

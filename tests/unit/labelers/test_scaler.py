@@ -112,3 +112,11 @@ def test_clamped_shares() -> None:
     tdbm = TDBM().fit([scene])
     shares = clamped_shares(tdbm.track_scaler_, tdbm.label_windows(scene))
     assert shares["v_avg"] == (0.05, 0.05)  # of 40 drivers, two beyond each percentile
+
+
+def test_jumping_positions_teach_nothing() -> None:
+    scenes = [traffic(seed=1)]
+    path = straight(0, 10, 3.5)
+    path[50:, 0] += 4.0
+    jumping = scene_of([path], road=scenes[0].road, name="jumping")
+    assert TDBM().fit([*scenes, jumping]).track_scaler_.total_drivers == TDBM().fit(scenes).track_scaler_.total_drivers
