@@ -68,12 +68,12 @@ class RightOfWay:
             return False
         ease = style.comfortable_deceleration_mps2
         first = stopping_m(car.speed, ease) + car.speed * style.reaction_time_s + car.LENGTH
-        return stopping_m(car.speed, YIELD_HARD * ease) <= max(distance, 0.0) <= first
+        return bool(stopping_m(car.speed, YIELD_HARD * ease) <= max(distance, 0.0) <= first)
 
     def _goes_first(self, other: Any, other_time: float, own: Any, own_time: float) -> bool:
         """The higher priority goes first; among equals, who comes first."""
         theirs, ours = self._inner[other].priority, self._inner[own].priority
-        return theirs > ours or (theirs == ours and other_time < own_time)
+        return bool(theirs > ours or (theirs == ours and other_time < own_time))
 
     def _arrival(self, car: StyledVehicle) -> tuple[Any, float, float] | None:
         """(path through the junction, m from bumper to its line, s until it is there); None if there is none ahead.

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from typing import Any, cast
 
 import numpy as np
@@ -25,7 +26,7 @@ PEDAL_LAG = 0.3  # chosen: drivers anticipate, so only this part of the reaction
 WANDER_SMOOTHING_S = 0.6  # chosen, because a car's lateral velocity has no jumps
 HEADING_S, LATERAL_S = 0.3, 1.0  # chosen: highway-env's 0.2 and 0.6 overshoot when the wheels take time to turn
 BEND_M = 0.5  # over which the curvature of the lane is taken
-KERB_M = 0.1  # what wander leaves between the car's side and the lane's edge
+KERB_M = 0.2  # what wander leaves between the car's side and the lane's edge
 CALM_MPS = 5.0  # below this speed wander and pedal noise fade: who stands does not stray
 LANE_ANGLE_RAD = 0.35  # chosen: largest angle to the lane; highway-env's 45 degrees spins slow cars
 WHEEL_RAD = 0.7  # chosen: lock of the front wheels; with highway-env's geometry a turning radius of 6.4 m
@@ -117,7 +118,7 @@ class StyledVehicle(IDMVehicle):  # type: ignore[misc]
             if target_lane_index[:2] == self._steered_lane[:2]:  # a lane change, not the next road
                 self._change_from_m, self._change_s = lateral, 0.0
             self._steered_lane = target_lane_index
-        place, rate = self._place_in_lane(lane.width_at(along))
+        place, rate = self._place_in_lane(float(lane.width_at(along)))
         speed = not_zero(self.speed)
         command = (rate + self.KP_LATERAL * (place - lateral)) / speed
         reach = math.sin(LANE_ANGLE_RAD)
@@ -180,10 +181,10 @@ class StyledVehicle(IDMVehicle):  # type: ignore[misc]
             self.road.collided_pairs.add(frozenset((self.driver_id, getattr(other, "driver_id", ""))))
         return touching, about_to, push
 
-    def predict_trajectory_constant_speed(self, times: np.ndarray) -> tuple[list[np.ndarray], list[float]]:
+    def predict_trajectory_constant_speed(self, times: np.ndarray) -> tuple[Sequence[np.ndarray], Sequence[float]]:
         """highway-env's prediction, computed once per state: the regulation asks for it once per pair."""
         key = (self.position.tobytes(), self.speed, self.lane_index, len(times))
         if getattr(self, "_predicted_for", None) != key:
             self._predicted = super().predict_trajectory_constant_speed(times)
             self._predicted_for = key
-        return cast("tuple[list[np.ndarray], list[float]]", self._predicted)
+        return cast("tuple[Sequence[np.ndarray], Sequence[float]]", self._predicted)
