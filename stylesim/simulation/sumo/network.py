@@ -22,7 +22,7 @@ NETCONVERT_OPTIONS = (
     "--output.street-names=false",
     "--junctions.corner-detail=8",
     "--junctions.internal-link-detail=24",  # points of the lane of a turn, because the tracks follow them
-    "--junctions.limit-turn-speed=2.5",  # lateral m/s2 at the limit; chosen, because bold drivers (1.3 x) reach 4
+    "--junctions.limit-turn-speed=2",  # lateral m/s2 at the limit; chosen, because bold drivers (1.3 x) reach 3.4
 )
 
 
