@@ -45,10 +45,19 @@ class Scene:
         object.__setattr__(self, "parameters", MappingProxyType(dict(self.parameters)))
 
     def history(self, t0: int, steps: int) -> Scene:
-        """What is known at frame t0 (see `Tracks.history`): no later frame, no commanded style, no outcome."""
+        """What is known at frame t0 (see `Tracks.history`): no later frame, no commanded style, no outcome.
+
+        `counts` and `parameters` go too: a drawn cycle time would tell when the light changes.
+        """
         tracks = self.tracks.history(t0, steps)
         first = t0 + 1 - tracks.n_frames
         signals = None if self.signals is None else self.signals.frames(first, t0 + 1)
         return replace(
-            self, tracks=tracks, signals=signals, start_s=self.start_s + first * tracks.dt_s, counts={}, t0_frame=None
+            self,
+            tracks=tracks,
+            signals=signals,
+            start_s=self.start_s + first * tracks.dt_s,
+            counts={},
+            parameters={},
+            t0_frame=None,
         )

@@ -37,6 +37,8 @@ def test_history_knows_nothing_later_and_nobody_by_style():
     assert past.tracks.driver == (None,) * 5
     assert not past.tracks.flags.any()
     assert past.signals.state.shape == (1, 50)
+    assert not past.counts
+    assert not past.parameters
     np.testing.assert_array_equal(past.tracks.position_m, scene.tracks.position_m[:, :50])
 
 
