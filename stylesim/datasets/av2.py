@@ -19,6 +19,7 @@ from jaxtyping import Float64
 
 from stylesim.datasets.accounting import row_counts
 from stylesim.datasets.av2_map import read_map
+from stylesim.datasets.flagging import flagged_implausible
 from stylesim.errors import InputError
 from stylesim.geometry import wrap_angle
 from stylesim.scene import Scene
@@ -121,7 +122,7 @@ def _scene(folder: Path, split: str) -> Scene:
         unit_id=f"av2_{scenario_id}",
         source=SOURCE,
         scenario=str(table["city"][0]),
-        tracks=_tracks(table, origin, T0_FRAME + 1 if observed <= T0_FRAME + 1 else N_FRAMES),
+        tracks=flagged_implausible(_tracks(table, origin, T0_FRAME + 1 if observed <= T0_FRAME + 1 else N_FRAMES)),
         road=read_map(maps[0], origin),
         source_scenario_id=scenario_id,
         official_split=split,

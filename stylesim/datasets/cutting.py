@@ -8,18 +8,17 @@ import numpy as np
 from jaxtyping import Bool, Float64
 
 from stylesim.datasets.accounting import added, row_counts
+from stylesim.datasets.flagging import flagged_implausible
 from stylesim.datasets.recording import Recording
 from stylesim.errors import InputError
 from stylesim.road import Road
 from stylesim.scene import Scene
 from stylesim.signals import Signals
-from stylesim.tracks import TrackFlag, Tracks
+from stylesim.tracks import Tracks
 
 # Chosen, because four windows of 5 s + 6 s that begin 3 s apart fill it with nothing left over, and because the
 # guard gap between time blocks of a split (>= 11 s) then costs one scene, not half a minute.
 SCENE_S = 20.0
-# Chosen, because no road user covers 7 m between two frames of 0.1 s (252 km/h) in traffic.
-JUMP_MPS = 70.0
 
 
 def cut(
@@ -79,9 +78,7 @@ def _tracks(
     heading[at] = recording.heading_rad[rows]
     ahead[at] = recording.lookahead[rows]
     valid[at] = True
-    step = np.hypot(*np.moveaxis(np.diff(position, axis=1), -1, 0)) / recording.dt_s
-    jumped = np.nan_to_num(step).max(axis=1, initial=0.0) > JUMP_MPS
-    return Tracks(
+    tracks = Tracks(
         agent_id=tuple(recording.agent_id[i] for i in agents),
         kind=recording.kind[agents],
         size_m=recording.size_m[agents],
@@ -91,9 +88,9 @@ def _tracks(
         valid=valid,
         dt_s=recording.dt_s,
         origin_m=origin_m,
-        flags=np.where(jumped, int(TrackFlag.IMPLAUSIBLE), 0).astype(np.int32),
         lookahead_steps=ahead,
     )
+    return flagged_implausible(tracks)
 
 
 def _signals(recording: Recording, first: int, n_frames: int) -> Signals | None:
