@@ -11,7 +11,9 @@ from rich.markup import escape
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn, TimeRemainingColumn
 from rich.table import Table
 
-_out = Console(highlight=False, soft_wrap=True)
+FILE_WIDTH = 140  # columns where the output is no terminal; chosen: the widest table, errors by style, fits
+
+_out = Console(highlight=False, soft_wrap=True, width=None if sys.stdout.isatty() else FILE_WIDTH)
 _err = Console(stderr=True, highlight=False, soft_wrap=True)
 
 
