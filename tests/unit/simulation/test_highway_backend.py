@@ -119,7 +119,7 @@ def test_collided_cars_are_flagged_and_removed_after_a_while():
     drawn = {"lanes": 1.0, "speed_limit_mps": 20.0, "density_per_km_lane": 10.0}
     traffic = highway_traffic(options, drawn, Crew(POPULATION, seed=1, episode=0), time_s=10.0)
     rear, middle, front = traffic.road.vehicles
-    middle.position = rear.position + [3.0, 0.0]
+    middle.position = rear.position + np.array([3.0, 0.0])
     log = TrackLog(30, 0.1)
     for _ in range(30):
         log.add(traffic.road.vehicles)
