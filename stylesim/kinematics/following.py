@@ -32,7 +32,7 @@ def corridor_leaders(
     neither the future nor a curvature estimate, whose noise would move the corridor by lanes at 50 m [ours].
     Overlapping vehicles have gap 0. Masks must be False where positions or directions are NaN.
     """
-    from stylesim.kinematics.kernels import corridor_scan
+    from stylesim.kinematics.pair_kernels import corridor_scan
 
     leader = np.full(is_ego.shape, -1, np.int32)
     gap = np.full(is_ego.shape, np.nan)

@@ -26,7 +26,7 @@ def displaced(
     Tells parked vehicles from traffic [ours: 1 m in the window]. `run` as in `smoothing.derivatives`; runs of one
     number that are interrupted count together.
     """
-    from stylesim.kinematics.kernels import left_its_place
+    from stylesim.kinematics.pair_kernels import left_its_place
 
     moved = np.zeros(run.shape, bool)
     left_its_place(position_m, run, more_than_m, moved)
@@ -47,7 +47,7 @@ def closing_on_neighbours(
     A neighbour is within `radius_m` (centre to centre) and drives within `heading_within_rad` of the ego's
     direction. The work is sparse: a sweep along the axis on which a frame's vehicles spread most.
     """
-    from stylesim.kinematics.kernels import closing_sums
+    from stylesim.kinematics.pair_kernels import closing_sums
 
     known = motion.known
     rate = np.zeros(known.shape)

@@ -111,20 +111,17 @@ def motion(
     distance driven: ds/dt = |v|, d2s/dt2 = a.u, d3s/dt3 = j.u + |a_across|^2 / |v| (differentiating a.u; the last
     term is what a bend adds, so that constant speed on a circle has no jerk). `run` as in `derivatives`.
     """
-    curve = derivatives(position_m, run, dt_s, smoother or Smoother())
-    velocity, acceleration, third = curve[..., 1], curve[..., 2], curve[..., 3]
-    speed = np.hypot(velocity[..., 0], velocity[..., 1])
-    moving = speed > DIRECTION_MIN_SPEED_MPS
-    heading = heading_rad.astype(np.float64)
-    divisor = np.where(moving, speed, 1.0)
-    ux = np.where(moving, velocity[..., 0] / divisor, np.cos(heading))
-    uy = np.where(moving, velocity[..., 1] / divisor, np.sin(heading))
-    across = acceleration[..., 1] * ux - acceleration[..., 0] * uy
-    bend = np.where(moving, across * across / divisor, 0.0)
-    return Motion(
-        position_m=curve[..., 0],
-        direction=np.stack([ux, uy], axis=-1),
-        speed_mps=speed,
-        acceleration_mps2=acceleration[..., 0] * ux + acceleration[..., 1] * uy,
-        jerk_mps3=third[..., 0] * ux + third[..., 1] * uy + bend,
-    )
+    from stylesim.kinematics.kernels import path_motion
+
+    smoother = smoother or Smoother()
+    planar, scalar = (*run.shape, 2), run.shape
+    result = Motion(
+        np.full(planar, np.nan), np.full(planar, np.nan),
+        np.full(scalar, np.nan), np.full(scalar, np.nan), np.full(scalar, np.nan),
+    )  # fmt: skip
+    path_motion(
+        np.ascontiguousarray(position_m), np.ascontiguousarray(heading_rad), np.ascontiguousarray(run),
+        operators(smoother, dt_s), smoother.least_samples, DIRECTION_MIN_SPEED_MPS,
+        result.position_m, result.direction, result.speed_mps, result.acceleration_mps2, result.jerk_mps3,
+    )  # fmt: skip
+    return result

@@ -145,3 +145,37 @@ def lane_leaders(
                 if distance <= range_m:
                     leader[ego, frame] = found
                     gap[ego, frame] = distance
+
+
+@njit(cache=True, nogil=True)
+@no_type_check
+def lane_pieces(lane, offset, run, bridge, jump, piece, changes):
+    """Number the stretches on one lane (or its successors), and mark the first frame after each lane change.
+
+    lane, offset, run, piece, changes [agent time]. A change is a jump of the offset with the lane, after at most
+    `bridge` frames without a lane; a stretch also ends where the lane or the run is interrupted.
+    """
+    agents, frames = lane.shape
+    for agent in range(agents):
+        last, number = -1, 0
+        for frame in range(frames):
+            if lane[agent, frame] < 0 or run[agent, frame] < 0:
+                continue
+            together = last >= 0 and run[agent, last] == run[agent, frame]
+            if together and frame - last <= bridge and lane[agent, last] != lane[agent, frame]:
+                changes[agent, frame] = abs(offset[agent, frame] - offset[agent, last]) > jump
+            if changes[agent, frame] or not together or frame - last > 1:
+                number += 1
+            piece[agent, frame] = number
+            last = frame
+
+
+@njit(cache=True, nogil=True)
+@no_type_check
+def near_event(event, within, near):
+    """Mark the frames within that many of an event, before and after it; event, near [agent time]."""
+    agents, frames = event.shape
+    for agent in range(agents):
+        for frame in range(frames):
+            if event[agent, frame]:
+                near[agent, max(0, frame - within) : min(frames, frame + within + 1)] = True

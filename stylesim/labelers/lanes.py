@@ -76,30 +76,16 @@ class Straying:
 
 def straying(found: LaneMatch, run: Int[np.ndarray, "agent time"], dt_s: float, options: FeatureOptions) -> Straying:
     """What s_center integrates. The offset is smoothed between lane changes, never across one."""
-    lane, raw = found.lane[..., 0], found.offset_m[..., 0]
-    agents, frames = lane.shape
-    known = (lane >= 0) & (run >= 0)
-    last = np.where(known, np.arange(frames), -1)
-    last = np.maximum.accumulate(last, axis=1)
-    before = np.concatenate([np.full((agents, 1), -1), last[:, :-1]], axis=1)
-    row = np.arange(agents)[:, None]
-    same_run = known & (before >= 0) & (run[row, before] == run)
-    bridged = same_run & (np.arange(frames) - before <= max(1, round(BRIDGE_S / dt_s)))
-    jump = np.abs(raw - raw[row, before]) > LANE_CHANGE_JUMP_M
-    changes = bridged & (lane != lane[row, before]) & jump
-    piece = np.cumsum(changes | (known & ~(same_run & (before == np.arange(frames) - 1))), axis=1)
-    curve = derivatives(raw[..., None], np.where(known, piece, -1), dt_s, options.smoother)[:, :, 0]
-    offset, sideways = np.abs(curve[..., 0]), np.abs(curve[..., 1])
-    rate = np.where(_near(changes, round(options.lane_change_s / dt_s)), 0.0, offset * (options.mu_per_s + sideways))
-    return Straying(rate=np.where(np.isfinite(curve[..., 0]), rate, np.nan), changes=changes)
+    from stylesim.labelers.lane_kernels import lane_pieces, near_event
 
-
-def _near(event: Bool[np.ndarray, "agent time"], frames: int) -> Bool[np.ndarray, "agent time"]:
-    """True within that many frames of an event."""
-    total = np.pad(np.cumsum(event, axis=1), ((0, 0), (1, 0)))
-    at = np.arange(event.shape[1])
-    low, high = np.maximum(at - frames, 0), np.minimum(at + frames + 1, event.shape[1])
-    return (total[:, high] - total[:, low]) > 0
+    lane, raw = np.ascontiguousarray(found.lane[..., 0]), np.ascontiguousarray(found.offset_m[..., 0])
+    piece, changes, near = np.full(lane.shape, -1, np.int32), np.zeros(lane.shape, bool), np.zeros(lane.shape, bool)
+    lane_pieces(lane, raw, run, max(1, round(BRIDGE_S / dt_s)), LANE_CHANGE_JUMP_M, piece, changes)
+    near_event(changes, round(options.lane_change_s / dt_s), near)
+    curve = derivatives(raw[..., None], piece, dt_s, options.smoother)[:, :, 0]
+    rate = np.abs(curve[..., 0]) * (options.mu_per_s + np.abs(curve[..., 1]))
+    rate[near & (piece >= 0) & np.isfinite(rate)] = 0.0
+    return Straying(rate=rate, changes=changes)
 
 
 def leaders(
