@@ -30,6 +30,7 @@ _HOME = {
     "TDBM": "stylesim.labelers.tdbm",
     "Tracks": "stylesim.tracks",
     "WindowSpec": "stylesim.windows",
+    "balance": "stylesim.merging.balance",
     "evaluate": "stylesim.report.evaluate",
     "generate": "stylesim.simulation.generate",
     "label": "stylesim.labelers.labelling",

@@ -5,13 +5,14 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from jaxtyping import Bool
+from jaxtyping import Bool, Float
 
 from stylesim.geometry import box_corners, boxes_overlap, wrap_angle
 from stylesim.tracks import Tracks
 
 MAX_SPEED_MPS = 75.0  # chosen, because 270 km/h is beyond public roads
 MAX_VELOCITY_ERROR_MPS = 3.0  # chosen: several times the noise of camera and lidar trackers (about 0.5 m/s)
+AGREEMENT_S = 0.5  # chosen: over one frame of 0.1 s, 0.3 m of position noise would look like 3 m/s
 MAX_SLIP_RAD = np.deg2rad(60.0)  # chosen: no road car slides at such an angle
 MOVING_MPS = 3.0  # below it a heading cannot be told from noise; chosen
 
@@ -33,23 +34,40 @@ class Implausible:
 def implausible(tracks: Tracks) -> Implausible:
     """Frames that jump faster than MAX_SPEED_MPS, whose velocity differs from the displacement, or that slide.
 
-    Velocity is held against the displacement over one frame, by the mean of the velocities at its two ends.
+    Velocity is held against the displacement over AGREEMENT_S, by the mean of the velocities in between.
     Headings are judged for motor vehicles above MOVING_MPS only.
     """
     both = tracks.valid[:, 1:] & tracks.valid[:, :-1]
     moved = np.diff(tracks.position_m.astype(np.float64), axis=1) / tracks.dt_s
-    meant = (tracks.velocity_mps[:, 1:] + tracks.velocity_mps[:, :-1]) / 2
     zero = np.zeros(tracks.valid.shape, bool)
     teleport, velocity, heading = zero.copy(), zero.copy(), zero.copy()
     with np.errstate(invalid="ignore"):
         teleport[:, 1:] = both & (np.hypot(moved[..., 0], moved[..., 1]) > MAX_SPEED_MPS)
-        error = np.hypot(*np.moveaxis(moved - meant, -1, 0))
-        velocity[:, 1:] = both & ~teleport[:, 1:] & (error > MAX_VELOCITY_ERROR_MPS)
+        velocity[:] = _disagreement(tracks, teleport) > MAX_VELOCITY_ERROR_MPS
         course = np.arctan2(tracks.velocity_mps[..., 1], tracks.velocity_mps[..., 0])
         slip = np.abs(wrap_angle(course - tracks.heading_rad))
         fast = tracks.valid & tracks.is_motor[:, None] & (tracks.speed_mps > MOVING_MPS)
         heading[:] = fast & (slip > MAX_SLIP_RAD)
     return Implausible(teleport, velocity, heading)
+
+
+def _disagreement(tracks: Tracks, teleport: Bool[np.ndarray, "agent time"]) -> Float[np.ndarray, "agent time"]:
+    """Mean velocity minus displacement over the AGREEMENT_S that end at each frame, m/s; 0 where a frame is missing."""
+    steps = max(1, round(AGREEMENT_S / tracks.dt_s))
+    result = np.zeros(tracks.valid.shape)
+    if tracks.n_frames <= steps:
+        return result
+    sound = np.where(tracks.valid & ~teleport, 0, 1)
+    broken = np.cumsum(np.concatenate([np.zeros((tracks.n_agents, 1), int), sound], axis=1), axis=1)
+    whole = broken[:, steps + 1 :] == broken[:, : -steps - 1]
+    between = (tracks.velocity_mps[:, 1:] + tracks.velocity_mps[:, :-1]).astype(np.float64) / 2
+    summed = np.cumsum(np.nan_to_num(between), axis=1)
+    meant = (
+        summed[:, steps - 1 :] - np.concatenate([np.zeros_like(summed[:, :1]), summed[:, :-steps]], axis=1)
+    ) / steps
+    moved = (tracks.position_m[:, steps:] - tracks.position_m[:, :-steps]).astype(np.float64) / (steps * tracks.dt_s)
+    result[:, steps:] = np.where(whole, np.hypot(*np.moveaxis(moved - meant, -1, 0)), 0.0)
+    return result
 
 
 def overlapping_pairs(tracks: Tracks, *, every: int = 1) -> int:

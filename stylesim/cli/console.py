@@ -54,6 +54,6 @@ def progress_bar(title: str, unit: str = "") -> Iterator[Callable[[int, int], No
         task = bar.add_task(title, total=None)
 
         def update(done: int, total: int) -> None:
-            bar.update(task, completed=done, total=total)
+            bar.update(task, completed=done, total=total or None)  # 0: the total is not known
 
         yield update

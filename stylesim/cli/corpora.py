@@ -46,6 +46,7 @@ def merge(
     split: str = typer.Option("0.8,0.1,0.1", help="Shares of train, val, test; by recording or episode."),
     noise: str = typer.Option("none", help="none, or fit: make simulated tracks as noisy as the recorded ones."),
     seed: int = typer.Option(0, min=0, help="Same seed, same bytes."),
+    resume: bool = typer.Option(False, help="Go on from an unfinished run of the same request."),
 ) -> None:
     """Merge corpora: one clock, one frame, split by recording, styles balanced by weights."""
     from stylesim.corpus import Corpus
@@ -65,6 +66,7 @@ def merge(
             seed=seed,
             out=out,
             noise=None if noise == "none" else noise,
+            resume=resume,
             progress=progress,
         )
     rows = []
@@ -75,6 +77,18 @@ def merge(
     show_table("Splits", ("split", "scenes", "units", "tracks"), rows)
     show_table("Counted", ("what", "n"), sorted(merged.manifest["counts"].items()))
     say(f"{out}")
+
+
+def balance(
+    corpus: Path = typer.Argument(help="A merged corpus, labelled where --by needs it."),
+    by: str = typer.Option("tdbm", help="What to balance: tdbm or source."),
+) -> None:
+    """Write sampling weights for a merged corpus that was labelled after it was made (e.g. after noise)."""
+    from stylesim.corpus import Corpus
+    from stylesim.merging.balance import balance as run
+
+    run(Corpus(corpus), by)
+    say(f"{corpus}: weights written, balanced by {by}")
 
 
 def verify(path: Path = typer.Argument(help="A corpus.")) -> None:
@@ -98,4 +112,5 @@ def add_to(app: typer.Typer) -> None:
     """Register the verbs."""
     app.command("read")(read)
     app.command("merge")(merge)
+    app.command("balance")(balance)
     app.command("verify")(verify)
