@@ -14,9 +14,11 @@ from stylesim.errors import InputError, SimulationError
 EGO = "ego"
 ROUTE = "ego.route"
 TRIES = 24  # places that are looked at for each onset
-ONSETS = 4  # onsets that are waited for before a narrow place is taken
+ONSETS = 4  # onsets that are waited for before any gap is taken
 HEADWAY_S = 1.2  # chosen: the time gap at which a place counts as free, near what drivers keep (0.96-1.92 s)
 STANDSTILL_M = 4.0
+TIGHT_M = 1.0  # what must be free before and behind an ego that is squeezed in
+COMFORT_MPS2 = 2.0  # comfortable deceleration, REFERENCE section 5
 LENGTH_M, WIDTH_M = 5.0, 1.8  # a passenger car, SUMO's default
 
 
@@ -118,8 +120,8 @@ def _slack_m(sumo: Any, lane: str, position_m: float, speed_mps: float) -> float
 
 
 def _braking_m(behind_mps: float, ahead_mps: float) -> float:
-    """Additional room for the one behind to slow down to the one ahead at a comfortable 2 m/s²."""
-    return max(behind_mps - ahead_mps, 0.0) ** 2 / (2 * 2.0)
+    """Additional room for the one behind to slow down to the one ahead in comfort."""
+    return max(behind_mps - ahead_mps, 0.0) ** 2 / (2 * COMFORT_MPS2)
 
 
 def insert_ego(
@@ -127,7 +129,8 @@ def insert_ego(
 ) -> tuple[Approach, Place]:
     """Run the crowd (`advance(until_s)`) until the ego can enter, and put it there.
 
-    SimulationError if the approach is so full that the ego would overlap somebody.
+    Where no place is free at the drawn approach at four onsets, the ego enters the widest gap of all approaches at
+    the pace of who is ahead, and meets the yellow when it does. SimulationError if there is no such gap either.
     """
     options = approaches(sumo)
     approach = options[int(rng.integers(len(options)))]
@@ -137,11 +140,31 @@ def insert_ego(
         place = find_place(sumo, approach, rng, config)
         if place.slack_m >= 0:
             break
-    needed = STANDSTILL_M + HEADWAY_S * place.speed_mps
-    if place.slack_m < -needed:
-        raise SimulationError(f"no room for the ego on {approach.edge!r} at {ONSETS} onsets: the demand is too high")
+    else:
+        approach, place = max(
+            ((option, widest_gap(sumo, lane)) for option in options for lane in option.lanes),
+            key=lambda item: item[1].slack_m,
+        )
+    if place.slack_m < 0:
+        raise SimulationError("no approach has room for the ego: the demand is too high")
     _put(sumo, approach, place)
     return approach, place
+
+
+def widest_gap(sumo: Any, lane: str) -> Place:
+    """The middle of the widest gap between two vehicles of a lane (or its ends), at a pace that can be braked."""
+    vehicles = sorted(
+        (sumo.vehicle.getLanePosition(name), sumo.vehicle.getLength(name), sumo.vehicle.getSpeed(name))
+        for name in sumo.lane.getLastStepVehicleIDs(lane)
+    )
+    fronts = [0.0, *(front for front, _, _ in vehicles)]
+    rears = [*(front - length for front, length, _ in vehicles), sumo.lane.getLength(lane)]
+    paces = [*(speed for _, _, speed in vehicles), 0.0]
+    widths = [rear - front for front, rear in zip(fronts, rears, strict=True)]
+    best = int(np.argmax(widths))
+    ahead_m = max((widths[best] - LENGTH_M) / 2, 0.0)
+    pace = min(sumo.lane.getMaxSpeed(lane), float(np.sqrt(paces[best] ** 2 + 2 * COMFORT_MPS2 * ahead_m)))
+    return Place(lane, rears[best] - ahead_m, pace, ahead_m - TIGHT_M)
 
 
 def _put(sumo: Any, approach: Approach, place: Place) -> None:

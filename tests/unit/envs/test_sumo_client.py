@@ -158,3 +158,16 @@ def test_a_lane_change_takes_the_ego_to_the_next_lane_and_no_further() -> None:
     left = -math.sin(first.pose[0, 4]) * moved[0] + math.cos(first.pose[0, 4]) * moved[1]
     assert snapshot.ego.lanes_left == 0
     assert left == pytest.approx(3.5, abs=0.6) or snapshot.ego.collided
+
+
+@pytest.mark.slow
+def test_the_ego_finds_room_in_a_crowd_that_queues_back() -> None:
+    scenario = load_scenario("yellow_light")
+    demand = scenario.parameters["demand_vph"].model_copy(update={"low": 5000.0, "high": 5000.0})
+    dense = scenario.model_copy(update={"parameters": {**scenario.parameters, "demand_vph": demand}})
+    world = SumoWorld(EnvConfig())
+    for seed in range(8):
+        first = world.reset(scenario=dense, population=Population.load("naturalistic"), seed=seed)
+        assert not first.ego.collided
+        assert not world.step(EgoCommand(-3.0, float("nan"), 0)).ego.collided
+    world.close()
