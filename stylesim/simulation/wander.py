@@ -72,7 +72,7 @@ def _follow(
     for frame in range(len(keep)):
         target = keep[frame] * target + kicks[frame]
         pull = FILTER_RAD_PER_S**2 * (limit_m * np.tanh(target / limit_m) - offset) - 2.0 * FILTER_RAD_PER_S * rate
-        np.clip(pull, -LARGEST_ACCELERATION_MPS2, LARGEST_ACCELERATION_MPS2, out=pull)
+        pull = np.minimum(np.maximum(pull, -LARGEST_ACCELERATION_MPS2), LARGEST_ACCELERATION_MPS2)
         rate += pace_s[frame] * pull
         offset = offset + pace_s[frame] * rate
         result[frame] = offset
@@ -93,7 +93,7 @@ def smoothed_slide(
     result = np.empty_like(pace_s)
     for frame, goal in enumerate(np.ascontiguousarray(slide_m.T)):
         pull = STEERING_RAD_PER_S**2 * (goal - offset) - 2.0 * STEERING_RAD_PER_S * rate
-        rate = np.clip(rate + pace_s[frame] * pull, -LARGEST_SLIDE_MPS, LARGEST_SLIDE_MPS)
+        rate = np.minimum(np.maximum(rate + pace_s[frame] * pull, -LARGEST_SLIDE_MPS), LARGEST_SLIDE_MPS)
         offset = offset + pace_s[frame] * rate
         result[frame] = offset
     return np.ascontiguousarray(result.T)
