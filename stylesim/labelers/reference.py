@@ -6,7 +6,6 @@ import json
 from collections.abc import Iterable, Sequence
 from pathlib import Path
 
-from stylesim.corpus.files import json_bytes, write_whole
 from stylesim.errors import InputError, unknown
 from stylesim.labelers.base import Labeler, Progress
 from stylesim.labelers.kdsc import KDSC
@@ -62,6 +61,8 @@ def load_labeler(path: Path) -> TDBM | KDSC:
 
 def save_labeler(labeler: Labeler, path: Path) -> None:
     """Write a fitted labeller as JSON, whole or not at all; numbers survive exactly."""
+    from stylesim.corpus.files import json_bytes, write_whole
+
     write_whole(path, json_bytes(labeler.to_dict()))
 
 
