@@ -18,7 +18,7 @@ from collections import Counter
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, Protocol, runtime_checkable
 
 from stylesim.corpus import write_part
 from stylesim.corpus.files import storage_error
@@ -26,6 +26,15 @@ from stylesim.population import Population
 from stylesim.scenario import Scenario
 from stylesim.scene import Scene
 from stylesim.simulation.backend import Backend, open_backend
+
+
+@runtime_checkable
+class Prepares(Protocol):
+    """A backend that can say before any work whether it can run a scenario."""
+
+    def prepare(self, scenario: Scenario) -> None:
+        """InputError if it cannot."""
+        ...
 
 
 class Task(NamedTuple):
@@ -80,6 +89,10 @@ class EpisodeRunner:
         self._backends: dict[str, Backend] = {
             name: open_backend(name) for name in sorted({scenario.backend for scenario in job.scenarios})
         }
+        for scenario in job.scenarios:
+            backend = self._backends[scenario.backend]
+            if isinstance(backend, Prepares):
+                backend.prepare(scenario)
 
     def run(self, task: Task) -> None:
         """Run one episode and write it. StylesimError, with the part absent, if that is not possible."""
