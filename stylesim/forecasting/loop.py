@@ -34,7 +34,7 @@ class TrainSettings:
     seed: int = 0
     epochs: int = 30
     max_steps: int | None = None
-    batch_size: int = 64
+    batch_size: int = 32
     lr: float = 1e-3
     weight_decay: float = 0.01
     patience: int = 8

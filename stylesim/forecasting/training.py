@@ -44,7 +44,7 @@ def train(
     out: str | Path,
     epochs: int = 30,
     max_steps: int | None = None,
-    batch_size: int = 64,
+    batch_size: int = 32,
     lr: float = 1e-3,
     patience: int = 8,
     judges: Judges | None = None,
