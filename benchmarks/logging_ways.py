@@ -17,6 +17,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+import polars as pl
 
 from stylesim.population import Population
 from stylesim.scenario import load_scenario
@@ -31,11 +32,11 @@ def _nothing(sumo: Any) -> Step:
     return lambda step: None
 
 
-def _getters(*names: str, listed: bool = False) -> Callable[[Any], Step]:
+def _getters(*names: str, listed: bool = False, raw: bool = False) -> Callable[[Any], Step]:
     """Getter calls per vehicle; `listed` asks SUMO for the list of vehicles each step."""
 
     def prepare(sumo: Any) -> Step:
-        calls = [getattr(sumo.vehicle, name) for name in names]
+        calls = [_raw(name) if raw else getattr(sumo.vehicle, name) for name in names]
         here: dict[str, None] = {}
         kept: list[Any] = []
 
@@ -57,6 +58,13 @@ def _getters(*names: str, listed: bool = False) -> Callable[[Any], Step]:
         return after
 
     return prepare
+
+
+def _raw(name: str) -> Any:
+    """The extension's own function, without libsumo's Python wrapper (private to libsumo)."""
+    from libsumo import libsumo
+
+    return getattr(libsumo._libsumo, f"vehicle_{name}")
 
 
 def _recorder(sumo: Any) -> Step:
@@ -97,12 +105,17 @@ def _no_options(folder: str) -> list[str]:
     return []
 
 
+READ_BACK = "SUMO's Parquet, x y posLat, read back"
 WAYS: dict[str, tuple[Callable[[Any], Step], Callable[[str], list[str]]]] = {
     "stepping alone": (_nothing, _no_options),
     "the recorder (2 getters, events, signal)": (_recorder, _no_options),
     "2 getters": (_getters("getPosition", "getLateralLanePosition"), _no_options),
     "2 getters, list of vehicles each step": (
         _getters("getPosition", "getLateralLanePosition", listed=True),
+        _no_options,
+    ),
+    "2 getters without Python wrappers": (
+        _getters("getPosition", "getLateralLanePosition", raw=True),
         _no_options,
     ),
     "5 getters": (
@@ -113,6 +126,7 @@ WAYS: dict[str, tuple[Callable[[Any], Step], Callable[[str], list[str]]]] = {
     "context subscription": (_context, _no_options),
     "SUMO's Parquet, all attributes": (_nothing, _output("parquet")),
     "SUMO's Parquet, x y": (_nothing, _output("parquet", "--fcd-output.attributes", "x,y")),
+    READ_BACK: (_nothing, _output("parquet", "--fcd-output.attributes", "x,y,posLat")),
     "SUMO's CSV, x y": (_nothing, _output("csv", "--fcd-output.attributes", "x,y")),
     "SUMO's XML, x y": (_nothing, _output("xml", "--fcd-output.attributes", "x,y")),
 }
@@ -130,6 +144,9 @@ def measure(engine: Engine, files: EpisodeFiles, way: str, folder: str) -> tuple
         after(step)
         steps += count()
     engine.close()
+    if way == READ_BACK:
+        table = pl.read_parquet(f"{folder}/fcd.parquet")
+        table.with_columns(pl.col("vehicle_id").cast(pl.Categorical).to_physical()).to_numpy()
     return time.process_time() - begin, steps
 
 
@@ -148,13 +165,13 @@ def main() -> None:
             for way, times in taken.items():
                 seconds, total = measure(engine, files, way, folder)
                 times.append(seconds)
-    base = statistics.median(taken["stepping alone"])
-    print(f"{total} vehicle-steps, {chosen.runs} interleaved runs; microseconds of CPU per vehicle-step")
+    print(f"{total} vehicle-steps, {chosen.runs} interleaved runs; CPU time per vehicle-step")
     for way, times in taken.items():
-        us = [1e6 * seconds / total for seconds in times]
+        ratios = [own / base for own, base in zip(times, taken["stepping alone"], strict=True)]
+        low, middle, high = np.quantile(ratios, [0.25, 0.5, 0.75])
+        us = 1e6 * statistics.median(times) / total
         print(
-            f"{way:42s} median {statistics.median(us):6.2f}  min {min(us):6.2f}  max {max(us):6.2f}"
-            f"  x {statistics.median(times) / base:.2f}"
+            f"{way:42s} {us:5.2f} us (least {1e6 * min(times) / total:5.2f})   x {middle:.2f} ({low:.2f} to {high:.2f})"
         )
 
 

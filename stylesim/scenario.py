@@ -65,10 +65,10 @@ def scenarios() -> tuple[str, ...]:
 def load_scenario(name: str) -> Scenario:
     """A shipped scenario by name, or the folder (or scenario.yaml) at a path. InputError if there is none."""
     path = Path(name)
-    if path.name == "scenario.yaml" or path.is_dir():
-        folder = path.parent if path.name == "scenario.yaml" else path
-    elif name in scenarios():
+    if name in scenarios():  # before folders: one of that name may lie in the working directory
         folder = scenarios_dir() / name
+    elif path.name == "scenario.yaml" or path.is_dir():
+        folder = path.parent if path.name == "scenario.yaml" else path
     else:
         raise unknown("scenario", name, scenarios())
     scenario = load_yaml(Scenario, folder / "scenario.yaml")
