@@ -13,6 +13,8 @@ from stylesim.resources import agents_dir
 from stylesim.specs import Spec, load_yaml
 from stylesim.style import CLASS_KNOB, PHYSICAL_FIELDS, DriverStyle, class_of_knob
 
+DECIMALS = 4  # of a drawn parameter: finer than anything that a driver could mean, and it stores in half the bytes
+
 
 class StyleParameter(Spec):
     """One driver parameter over the knob: values at the six classes and neutral, with unit and source."""
@@ -52,7 +54,7 @@ class StyleTable(Spec):
             value = float(np.interp(aggressiveness, places, [getattr(parameter, cls) for _, cls in knots]))
             if rng is not None:
                 factor = float(np.exp(parameter.spread * np.clip(rng.standard_normal(), -2.0, 2.0)))
-                value = float(np.clip(value * factor, parameter.low, parameter.high))
+                value = round(float(np.clip(value * factor, parameter.low, parameter.high)), DECIMALS)
             values[key] = value
         return DriverStyle(name=name, aggressiveness=float(aggressiveness), **values)
 

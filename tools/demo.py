@@ -14,7 +14,7 @@ from pathlib import Path
 ROOT = Path(__file__).resolve().parent.parent
 RUNS = ROOT / "runs" / "demo"
 WORKERS = "2"
-SUMO_EPISODES, HIGHWAY_EPISODES = "24", "16"
+SUMO_EPISODES, HIGHWAY_EPISODES = "24", "24"
 SEED = "7"
 
 
@@ -60,7 +60,7 @@ def main() -> None:
     for condition in ("none", "tdbm"):
         model = RUNS / f"model_{condition}"
         models.append(model)
-        stylesim("train", mixed, "--condition", condition, "--seed", SEED, "--minutes", "1.5", "--out", model, out=model, resumable=True)
+        stylesim("train", mixed, "--condition", condition, "--seed", SEED, "--epochs", "12", "--out", model, out=model, resumable=True)
     report = RUNS / "report"
     stylesim("evaluate", *models, "constant_velocity", mixed, "--by", "tdbm,kdsc,scenario,source", "--out", report, out=report)
     sys.stdout.write(f"\nDone in {time.monotonic() - begin:.0f} s. The report: {report / 'report.html'}\n")

@@ -59,7 +59,7 @@ def train(
             progress=progress,
         )
     rows = [
-        (r["epoch"], f"{r['train_loss']:.3f}", f"{r['val_loss']:.3f}", f"{r['val_min_fde_m']:.2f}")
+        (r["epoch"], f"{r['train_loss']:.3f}", f"{r['val_loss']:.3f}", f"{r['min_fde_m']:.2f}")
         for r in model.training_curve
     ]
     show_table("Training", ("epoch", "train loss", "val loss", "val minFDE (m)"), rows)

@@ -18,6 +18,7 @@ from stylesim.signals import Signals
 from stylesim.style import PHYSICAL_FIELDS, DriverStyle
 from stylesim.tracks import Tracks
 
+DRIVER_PARAMETERS = ("aggressiveness", *PHYSICAL_FIELDS)  # order of the list in `driver_parameters`
 ROW_GROUP = 1 << 18  # fixed: the bytes must not depend on the machine
 LEVEL = 9  # of zstd; chosen: 3 % smaller than 3, and encoding is still a small part of a simulation's time
 
@@ -54,7 +55,7 @@ def agents_table(scenes: Sequence[Scene]) -> pl.DataFrame:
     rows: dict[str, list[Any]] = {
         name: [] for name in ("scene", "agent_id", "kind", "length_m", "width_m", "flags", "driver")
     }
-    physical: dict[str, list[float | None]] = {f"driver.{name}": [] for name in ("aggressiveness", *PHYSICAL_FIELDS)}
+    parameters: list[list[float] | None] = []
     for number, scene in enumerate(scenes):
         tracks = scene.tracks
         assert tracks.flags is not None
@@ -65,12 +66,16 @@ def agents_table(scenes: Sequence[Scene]) -> pl.DataFrame:
         rows["width_m"] += tracks.size_m[:, 1].tolist()
         rows["flags"] += tracks.flags.tolist()
         rows["driver"] += [None if driver is None else driver.name for driver in tracks.driver]
-        for key, values in physical.items():
-            name = key.removeprefix("driver.")
-            values += [None if driver is None else getattr(driver, name) for driver in tracks.driver]
+        parameters += [_parameters(driver) for driver in tracks.driver]
     schema: dict[str, Any] = {"scene": pl.Int32, "agent_id": pl.String, "kind": pl.Int8, "length_m": pl.Float32}
     schema |= {"width_m": pl.Float32, "flags": pl.Int32, "driver": pl.String}
-    return pl.DataFrame({**rows, **physical}, schema={**schema, **dict.fromkeys(physical, pl.Float64)})
+    return pl.DataFrame(
+        {**rows, "driver_parameters": parameters}, schema={**schema, "driver_parameters": pl.List(pl.Float64)}
+    )
+
+
+def _parameters(driver: DriverStyle | None) -> list[float] | None:
+    return None if driver is None else [getattr(driver, name) for name in DRIVER_PARAMETERS]
 
 
 def signals_table(scenes: Sequence[Scene]) -> pl.DataFrame:
@@ -104,9 +109,7 @@ def _signals(meta: Mapping[str, Any] | None, rows: pl.DataFrame, n_frames: int) 
 def _driver(row: Mapping[str, Any]) -> DriverStyle | None:
     if row["driver"] is None:
         return None
-    return DriverStyle(
-        name=row["driver"], **{name: row[f"driver.{name}"] for name in ("aggressiveness", *PHYSICAL_FIELDS)}
-    )
+    return DriverStyle(row["driver"], **dict(zip(DRIVER_PARAMETERS, row["driver_parameters"], strict=True)))
 
 
 def part_tables(folder: Path, part: int) -> tuple[pl.DataFrame, pl.DataFrame, pl.DataFrame]:

@@ -15,7 +15,7 @@ import polars as pl
 from stylesim.corpus.codec import HEADING_RAD, POSITION_M, VELOCITY_MPS
 from stylesim.corpus.files import json_bytes, sha256_of, storage_error, write_whole
 from stylesim.corpus.roads import write_road
-from stylesim.corpus.tables import agents_table, parquet_bytes, signals_table, tracks_table
+from stylesim.corpus.tables import DRIVER_PARAMETERS, agents_table, parquet_bytes, signals_table, tracks_table
 from stylesim.errors import CorpusError, InputError
 from stylesim.scene import Scene
 
@@ -157,12 +157,14 @@ class CorpusWriter:
             total.update(json.loads(row["counts"]))
         self._write_manifest(rows, files, {**total, **(counts or {})})
         write_whole(self.partial / "run.json", json_bytes(dict(run or {})))
-        (self.partial / "request.json").unlink()
-        shutil.rmtree(self.partial / "records")
+        for stray in self.partial.rglob(".*.tmp"):  # left by a writer that was killed
+            stray.unlink()
         try:
             self.partial.rename(self.out)
         except OSError as error:
             raise storage_error(error, self.out) from error
+        shutil.rmtree(self.out / "records")  # after the rename: a kill in between costs two stray files, not the work
+        (self.out / "request.json").unlink()
         return Corpus(self.out)
 
     def _write_manifest(self, rows: list[dict[str, Any]], files: dict[str, str], counts: Mapping[str, int]) -> None:
@@ -173,6 +175,7 @@ class CorpusWriter:
             "n_scenes": len(rows), "n_agents": sum(row["n_agents"] for row in rows),
             "n_steps": sum(row["n_steps"] for row in rows), "dt_s": sorted({row["dt_s"] for row in rows}),
             "scales": {"position_m": POSITION_M, "velocity_mps": VELOCITY_MPS, "heading_rad": HEADING_RAD},
+            "driver_parameters": list(DRIVER_PARAMETERS),
             "versions": {"stylesim": __version__, "polars": pl.__version__},
         }  # fmt: skip
         write_whole(self.partial / "corpus.json", json_bytes(manifest))

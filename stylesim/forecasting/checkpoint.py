@@ -20,6 +20,7 @@ from stylesim.forecasting.config import ModelConfig
 from stylesim.forecasting.forecaster import TrainedForecaster
 from stylesim.forecasting.model import ForecastNetwork
 
+RECORD_FILE = "training.json"  # settings, corpus and loss curve, for the report
 MODEL_FILE = "model.pt"
 FORMAT, VERSION = "stylesim-forecaster", 1
 
@@ -80,9 +81,21 @@ def load(path: str | Path) -> TrainedForecaster:
         with torch.random.fork_rng():  # its start weights are drawn, then overwritten
             network = ForecastNetwork(config)
         network.load_state_dict(content["state"])
-        return TrainedForecaster(str(content["name"]), network, conditioner)
+        forecaster = TrainedForecaster(str(content["name"]), network, conditioner)
     except (KeyError, TypeError, ValueError, RuntimeError) as error:
         raise InputError(f"{file} is a damaged checkpoint: {_first_line(error)}") from error
+    forecaster.training_curve = _curve(file.with_name(RECORD_FILE))
+    return forecaster
+
+
+def _curve(record: Path) -> tuple[Mapping[str, float], ...]:
+    """The loss curve in the record beside a checkpoint; () where there is no record."""
+    if not record.is_file():
+        return ()
+    try:
+        return tuple(json.loads(record.read_bytes())["curve"])
+    except (KeyError, TypeError, ValueError) as error:
+        raise InputError(f"{record} is no record of a training: {error!r}") from error
 
 
 def conditioner_from_dict(raw: Mapping[str, Any] | None) -> StyleConditioner | None:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 import torch
@@ -33,6 +33,7 @@ class TrainedForecaster:
         self.name = name
         self.network = network.eval()
         self.conditioner = conditioner
+        self.training_curve: tuple[Mapping[str, float], ...] = ()  # one record per epoch, where the folder has them
         self._cutter = RoadCutter(network.config.inputs)
 
     @property

@@ -14,7 +14,7 @@ import torch
 
 from stylesim.corpus import Corpus
 from stylesim.errors import InputError, unknown
-from stylesim.forecasting.checkpoint import MODEL_FILE, load, save
+from stylesim.forecasting.checkpoint import MODEL_FILE, RECORD_FILE, load, save
 from stylesim.forecasting.conditioner import Judges, StyleConditioner, fit_conditioner
 from stylesim.forecasting.config import CONDITIONS, InputConfig, ModelConfig, model_config
 from stylesim.forecasting.data import TrainingData
@@ -28,7 +28,6 @@ from stylesim.randomness import stream
 from stylesim.resources import cache_dir
 from stylesim.windows import WindowSpec
 
-RECORD_FILE = "training.json"  # settings, corpus and loss curve, for the report
 NULL_STYLE = -1
 
 
