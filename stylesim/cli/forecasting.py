@@ -32,19 +32,38 @@ class Fusion(StrEnum):
     late = "late"
 
 
+class Reading(StrEnum):
+    """How style, cluster and context make one embedding (docs of `StyleContextEmbedding`)."""
+
+    R1 = "R1"
+    R2 = "R2"
+    R3 = "R3"
+    R4 = "R4"
+    R5 = "R5"
+
+
 def train(
     corpus: Path = typer.Argument(help="A merged corpus (with splits)."),
     out: Path = typer.Option(..., "--out", help="Folder of the new model; must not exist."),
     condition: Condition = typer.Option(Condition.none, help="Condition on the style of the history."),
     fusion: Fusion = typer.Option(Fusion.early, help="Where the style enters."),
     size: str = typer.Option("tiny", help="tiny, small or base."),
+    reading: Reading = typer.Option(Reading.R1, help="How style, cluster and context make one embedding."),
     epochs: int = typer.Option(20, min=1, help="At most this many epochs; stops early without progress."),
+    max_steps: int | None = typer.Option(None, min=1, help="At most this many batches, whatever the epochs."),
+    patience: int = typer.Option(8, min=1, help="Epochs without a better validation minFDE before it stops."),
+    batch_size: int = typer.Option(32, min=1, help="Samples per step."),
+    lr: float = typer.Option(1e-3, min=1e-9, help="Peak learning rate."),
+    history: float = typer.Option(5.0, min=0.1, help="Seconds of history that the model sees."),
+    future: float = typer.Option(6.0, min=0.1, help="Seconds that it forecasts."),
+    stride: float = typer.Option(3.0, min=0.1, help="Seconds from one t0 of a scene to the next."),
     seed: int = typer.Option(0, min=0, help="Same seed, same weights (on one kind of machine)."),
     resume: bool = typer.Option(False, help="Go on from an unfinished training of the same request."),
 ) -> None:
     """Train the forecaster, with or without style."""
     from stylesim.corpus import Corpus
     from stylesim.forecasting.training import train as run
+    from stylesim.windows import WindowSpec
 
     with progress_bar(f"training {out.name}", "steps") as progress:
         model = run(
@@ -52,7 +71,13 @@ def train(
             condition=condition.value,
             fusion=fusion.value,
             size=size,
+            reading=reading.value,
+            spec=WindowSpec(history, future, stride),
             epochs=epochs,
+            max_steps=max_steps,
+            patience=patience,
+            batch_size=batch_size,
+            lr=lr,
             seed=seed,
             out=out,
             resume=resume,
