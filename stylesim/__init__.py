@@ -8,7 +8,8 @@ from __future__ import annotations
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
-__version__ = "0.1.0"
+from stylesim.envs.registration import register as _register
+from stylesim.version import __version__
 
 _HOME = {
     "AgentKind": "stylesim.tracks",
@@ -62,3 +63,5 @@ if TYPE_CHECKING:
     from stylesim.forecast import Forecast as Forecast
     from stylesim.population import Population as Population
     from stylesim.scene import Scene as Scene
+
+_register()  # the Gymnasium ids; idempotent, and loads no simulator

@@ -7,7 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Bool, Float
 
-from stylesim.geometry import box_corners, boxes_overlap, wrap_angle
+from stylesim.geometry import wrap_angle
+from stylesim.overlaps import overlaps
 from stylesim.tracks import Tracks
 
 MAX_SPEED_MPS = 75.0  # chosen, because 270 km/h is beyond public roads
@@ -72,23 +73,10 @@ def _disagreement(tracks: Tracks, teleport: Bool[np.ndarray, "agent time"]) -> F
 
 def overlapping_pairs(tracks: Tracks, *, every: int = 1) -> int:
     """How many pairs of motor vehicles' boxes overlap in at least one of every `every`-th frame."""
-    pairs: set[tuple[int, int]] = set()
-    motor = np.flatnonzero(tracks.is_motor)
-    for frame in range(0, tracks.n_frames, every):
-        here = motor[tracks.valid[motor, frame]]
-        if len(here) < 2:
-            continue
-        centre = tracks.position_m[here, frame].astype(np.float64)
-        reach = np.hypot(tracks.size_m[here, 0], tracks.size_m[here, 1]) / 2
-        order = np.argsort(centre[:, 0], kind="stable")
-        x, r = centre[order, 0], float(reach.max())
-        stop = np.searchsorted(x, x + 2 * r, side="right")
-        first = np.repeat(np.arange(len(here)), stop - np.arange(len(here)) - 1)
-        second = np.concatenate([np.arange(i + 1, stop[i]) for i in range(len(here))]).astype(np.int64)
-        a, b = order[first], order[second]
-        near = np.hypot(*(centre[a] - centre[b]).T) < reach[a] + reach[b]
-        a, b = a[near], b[near]
-        corners = box_corners(centre, tracks.heading_rad[here, frame].astype(np.float64), tracks.size_m[here])
-        hit = boxes_overlap(corners[a], corners[b])
-        pairs |= {(int(min(i, j)), int(max(i, j))) for i, j in zip(here[a[hit]], here[b[hit]], strict=True)}
-    return len(pairs)
+    frames = np.arange(0, tracks.n_frames, every)
+    agent, place = np.nonzero(tracks.valid[:, frames] & tracks.is_motor[:, None])
+    frame = frames[place]
+    found = overlaps(
+        frame, agent, tracks.position_m[agent, frame], tracks.heading_rad[agent, frame], tracks.size_m[agent]
+    )
+    return len({(int(min(a, b)), int(max(a, b))) for _, a, b in found})

@@ -8,7 +8,7 @@ import traceback
 
 import typer
 
-from stylesim import __version__
+from stylesim.version import __version__
 from stylesim.cli import corpora, describing, forecasting, generating, labelling
 from stylesim.cli.console import err
 from stylesim.errors import StylesimError

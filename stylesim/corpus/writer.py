@@ -168,7 +168,7 @@ class CorpusWriter:
         return Corpus(self.out)
 
     def _write_manifest(self, rows: list[dict[str, Any]], files: dict[str, str], counts: Mapping[str, int]) -> None:
-        from stylesim import __version__
+        from stylesim.version import __version__
 
         manifest = {
             "format": FORMAT, "schema_version": SCHEMA_VERSION, **self._request, "counts": dict(counts), "files": files,

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import xml.etree.ElementTree as ET
-from collections import defaultdict
+from collections import Counter, defaultdict
 from dataclasses import dataclass
 from functools import lru_cache
 from pathlib import Path
@@ -69,17 +69,30 @@ def read_network(path: Path) -> RoadNetwork:
                 )
             )
     controlled = {link.lane for link in links}
-    lanes = [lane for edge in edges for lane in _lanes(edge, successors, controlled)]
+    crossings = _crossings(edges)
+    lanes = [lane for edge in edges for lane in _lanes(edge, successors, controlled, crossings)]
     outer = tuple(e.attrib["id"] for e in edges if e.get("function") != "internal")
     length = {lane.attrib["id"]: float(lane.attrib["length"]) for edge in edges for lane in edge.findall("lane")}
     ordered = tuple(sorted(links, key=lambda link: (link.signal, link.index)))
     return RoadNetwork(Road(tuple(lanes)), ordered, length, outer)
 
 
-def _lanes(edge: ET.Element, successors: dict[str, list[str]], controlled: set[str]) -> list[Lane]:
+def _crossings(edges: list[ET.Element]) -> set[str]:
+    """Nodes where streams can cross: two or more edges come in and two or more go out.
+
+    A motorway merge, lane drop or exit is none: traffic there is on one road, which is what the context asks.
+    """
+    coming = Counter(edge.attrib["to"] for edge in edges if "to" in edge.attrib)
+    going = Counter(edge.attrib["from"] for edge in edges if "from" in edge.attrib)
+    return {node for node in coming if coming[node] >= 2 and going[node] >= 2}
+
+
+def _lanes(edge: ET.Element, successors: dict[str, list[str]], controlled: set[str], crossings: set[str]) -> list[Lane]:
     """The lanes of one edge, right to left; lanes too short to have a direction are left out."""
     elements = edge.findall("lane")
     ids = [element.attrib["id"] for element in elements]
+    internal = edge.get("function") == "internal"
+    crossing = internal and edge.attrib["id"].removeprefix(":").rsplit("_", 1)[0] in crossings
     lanes = []
     for index, element in enumerate(elements):
         shape, width = _shape(element.attrib["shape"]), float(element.get("width", "3.2"))
@@ -94,7 +107,7 @@ def _lanes(edge: ET.Element, successors: dict[str, list[str]], controlled: set[s
                 successors=tuple(successors[ids[index]]),
                 left_neighbour=ids[index + 1] if index + 1 < len(ids) else "",
                 right_neighbour=ids[index - 1] if index else "",
-                in_junction=edge.get("function") == "internal",
+                in_junction=crossing,
                 stop_line_m=_stop_line(shape, width).astype(np.float32) if ids[index] in controlled else None,
             )
         )

@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 from jaxtyping import Bool, Int32, Int64
 
+from stylesim.overlaps import overlaps
 from stylesim.scene import Scene
 from stylesim.signals import Signals
-from stylesim.simulation.overlaps import overlapping_pairs
 from stylesim.simulation.sumo.bodies import Bodies, bodies_of
 from stylesim.simulation.sumo.episode import DT_S, EpisodeFiles
 from stylesim.simulation.sumo.events import flags_of
@@ -116,8 +116,6 @@ def _overlap_counts(
     """Pairs of drivers whose logged boxes overlap at least once, and in how many frames."""
     size = np.array([[files.drivers[name].length_m, files.drivers[name].width_m] for name in driver_ids]).reshape(-1, 2)
     who = bodies.driver[logged]
-    found = overlapping_pairs(
-        bodies.step[logged], who, bodies.position_m[logged], bodies.heading_rad[logged], size[who]
-    )
+    found = overlaps(bodies.step[logged], who, bodies.position_m[logged], bodies.heading_rad[logged], size[who])
     pairs = {(min(a, b), max(a, b)) for _, a, b in found.tolist()}
     return {"overlaps": len(pairs), "overlap_frames": len(found)}

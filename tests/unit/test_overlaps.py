@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from stylesim.geometry import box_corners, boxes_overlap
-from stylesim.simulation.overlaps import overlapping_pairs
+from stylesim.overlaps import overlaps
 
 
 def test_equals_looking_at_every_pair() -> None:
@@ -22,7 +22,7 @@ def test_equals_looking_at_every_pair() -> None:
         for j in range(i)
         if frame[i] == frame[j] and boxes_overlap(corners[i], corners[j])
     }
-    found = overlapping_pairs(frame, agent, position, heading, size)
+    found = overlaps(frame, agent, position, heading, size)
     assert expected
     assert {(int(f), *sorted((int(a), int(b)))) for f, a, b in found} == expected
     assert len(found) == len(expected)
@@ -30,4 +30,4 @@ def test_equals_looking_at_every_pair() -> None:
 
 def test_nobody_overlaps_alone() -> None:
     one = np.zeros(1, np.int64)
-    assert overlapping_pairs(one, one, np.zeros((1, 2)), np.zeros(1), np.ones((1, 2))).shape == (0, 3)
+    assert overlaps(one, one, np.zeros((1, 2)), np.zeros(1), np.ones((1, 2))).shape == (0, 3)

@@ -10,7 +10,7 @@ from stylesim.geometry import box_corners, boxes_overlap
 SWEEP = np.array([0.8, 0.6])  # neither along nor square to most roads, so that few vehicles share a place
 
 
-def overlapping_pairs(
+def overlaps(
     frame: Int[np.ndarray, " row"],
     agent: Int[np.ndarray, " row"],
     position_m: Float[np.ndarray, "row 2"],
