@@ -7,7 +7,6 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Bool, Float, Float64, Int, Int32
 
-from stylesim.geometry import project
 from stylesim.kinematics import Leaders, Motion, corridor_leaders
 from stylesim.kinematics.smoothing import derivatives
 from stylesim.labelers.options import FeatureOptions
@@ -57,13 +56,15 @@ def match(tracks: Tracks, index: RoadIndex, wanted: Bool[np.ndarray, "agent time
 
 def _leave_own_track_out(tracks: Tracks, index: RoadIndex, found: LaneMatch) -> None:
     """Measure the offset of a driver whose own track made an inferred centre from the centre without it."""
-    for agent, agent_id in enumerate(tracks.agent_id):
-        for lane in index.evidence.get(agent_id, ()):
-            frames = np.flatnonzero(found.lane[agent, :, 0] == lane)
-            if len(frames):
-                line = index.lane_without(lane, agent_id).centre_line_m
-                _, offset, distance, _ = project(tracks.position_m[agent, frames], line)
-                found.offset_m[agent, frames, 0] = np.copysign(distance, offset)
+    lines = index.left_out
+    if lines is None or lines.of_track.keys().isdisjoint(tracks.agent_id):
+        return
+    from stylesim.labelers.offset_kernels import offsets_from_lines
+
+    offsets_from_lines(
+        tracks.position_m, found.lane, *lines.of_agents(tracks.agent_id), lines.lane, lines.start, lines.point_m,
+        found.offset_m,
+    )  # fmt: skip
 
 
 @dataclass(frozen=True, eq=False)

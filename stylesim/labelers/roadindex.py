@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 
 import numpy as np
 from jaxtyping import Bool, Float64, Int32, Int64
 
 from stylesim.geometry import arc_length, resampled
+from stylesim.labelers.leftout import LeftOutLines, left_out_lines
 from stylesim.road import Lane, Road
 
 # Width where a lane does not tell it. Chosen: between the usual 3.25 m in towns and 3.75 m on motorways.
@@ -41,15 +42,7 @@ class RoadIndex:
     ahead_m: Float64[np.ndarray, " successor"]  # from the end of the lane to the start of that successor
     station_start: Int64[np.ndarray, " lane_plus_one"]
     station_near_junction: Bool[np.ndarray, " station"]
-    evidence: dict[str, tuple[int, ...]]  # which lanes a track was used for
-    _without: dict[tuple[int, str], Lane] = field(default_factory=dict)
-
-    def lane_without(self, lane: int, agent_id: str) -> Lane:
-        """The lane made without that track (see `Lane.without`), remembered."""
-        key = (lane, agent_id)
-        if key not in self._without:
-            self._without[key] = self.road.lanes[lane].without(agent_id)
-        return self._without[key]
+    left_out: LeftOutLines | None  # of lanes that were inferred from tracks
 
 
 def build(road: Road, *, range_m: float) -> RoadIndex:
@@ -63,10 +56,6 @@ def build(road: Road, *, range_m: float) -> RoadIndex:
     length = np.array([arc_length(line)[-1] for line in lines], np.float64)
     ahead = _successors(lanes, length, range_m)
     stations = _stations(lanes, lines)
-    evidence: dict[str, list[int]] = {}
-    for index, lane in enumerate(lanes):
-        for track in () if lane.evidence is None else lane.evidence.track_id:
-            evidence.setdefault(track, []).append(index)
     return RoadIndex(
         road=road, segment_m=segments, segment_turn=turns, segment_lane=owner, reach_m=reach, length_m=length,
         limit_mps=np.array([lane.speed_limit_mps for lane in lanes], np.float64),
@@ -76,7 +65,7 @@ def build(road: Road, *, range_m: float) -> RoadIndex:
         ahead_m=np.array([metres for a in ahead for _, metres in a], np.float64),
         station_start=_starts([len(s) for s in stations]),
         station_near_junction=np.concatenate(stations) if stations else np.zeros(0, bool),
-        evidence={track: tuple(found) for track, found in evidence.items()},
+        left_out=left_out_lines(road),
     )  # fmt: skip
 
 
