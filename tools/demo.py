@@ -13,56 +13,73 @@ from pathlib import Path
 
 ROOT = Path(__file__).resolve().parent.parent
 RUNS = ROOT / "runs" / "demo"
-WORKERS = "2"
-SUMO_EPISODES, HIGHWAY_EPISODES = "24", "24"
-SEED = "7"
+CROWD = ["--population", "tdbm_spectrum", "--seed", "7", "--workers", "2"]
+EPISODES = "16"  # per scenario
+MAX_STEPS = "1200"  # of each training; chosen, because two trainings must fit into a few minutes on two cores
+SPLIT = "0.6,0.15,0.25"  # more in the test split than usual, so that most cells have 30 drivers
+
+
+def shown(word: str | Path) -> str:
+    """A word of a command as a user in the project's folder would type it."""
+    return str(word.relative_to(ROOT)) if isinstance(word, Path) else word
 
 
 def stylesim(*words: str | Path, out: Path, resumable: bool = False) -> None:
     """Run one verb unless its output is there."""
-    shown = " ".join(str(w.relative_to(ROOT)) if isinstance(w, Path) and w.is_relative_to(ROOT) else str(w) for w in words)
+    line = f"stylesim {' '.join(map(shown, words))}"
     if out.exists():
-        sys.stdout.write(f"\n[there already] stylesim {shown}\n")
+        sys.stdout.write(f"\n[there already] {line}\n")
         return
-    sys.stdout.write(f"\n$ stylesim {shown}\n")
+    sys.stdout.write(f"\n$ {line}\n")
     sys.stdout.flush()
     partial = out.with_name(out.name + ".partial")
     resume = ["--resume"] if resumable and partial.exists() else []
     done = subprocess.run([sys.executable, "-m", "stylesim", *map(str, words), *resume], check=False)
     if done.returncode != 0:
-        sys.stderr.write(f"\nthe step failed (exit code {done.returncode}); `make demo` goes on from here when repeated\n")
+        sys.stderr.write(f"\nstopped (exit code {done.returncode}); `make demo` goes on from here when repeated\n")
         raise SystemExit(done.returncode)
 
 
-def corpora() -> tuple[Path, Path, Path]:
-    """Simulated and recorded traffic."""
-    sumo, highway, real = RUNS / "sumo", RUNS / "highway", RUNS / "dlr_ut"
-    common = ("--population", "tdbm_spectrum", "--seed", SEED, "--workers", WORKERS)
-    stylesim("generate", "yellow_light", "ramp_merge", "--episodes", SUMO_EPISODES, *common, "--out", sumo, out=sumo, resumable=True)
-    stylesim("generate", "highway", "intersection", "--episodes", HIGHWAY_EPISODES, *common, "--out", highway, out=highway, resumable=True)
-    stylesim("read", "dlr_ut", ROOT / "data" / "dlr_ut", "--out", real, out=real, resumable=True)
-    return sumo, highway, real
+def generate(out: Path, *scenarios: str) -> Path:
+    """Simulated traffic of those scenarios."""
+    stylesim("generate", *scenarios, "--episodes", EPISODES, *CROWD, "--out", out, out=out, resumable=True)
+    return out
+
+
+def label(corpus: Path) -> None:
+    """TDBM and KDSC labels of one corpus, by the shipped references."""
+    for method in ("tdbm", "kdsc"):
+        stylesim("label", corpus, "--method", method, out=corpus / "labels" / f"{method}.history.json")
+
+
+def train(mixed: Path, condition: str) -> Path:
+    """One forecaster."""
+    model = RUNS / f"model_{condition}"
+    options = ["--condition", condition, "--max-steps", MAX_STEPS, "--seed", "7"]
+    stylesim("train", mixed, *options, "--out", model, out=model, resumable=True)
+    return model
 
 
 def main() -> None:
     """Generate, read, label, merge, train, evaluate."""
     begin = time.monotonic()
     RUNS.mkdir(parents=True, exist_ok=True)
-    parts = corpora()
-    for method in ("tdbm", "kdsc"):
-        for corpus in parts:
-            stylesim("label", corpus, "--method", method, out=corpus / "labels" / f"{method}.history.json")
+    simulated = [
+        generate(RUNS / "sumo", "yellow_light", "ramp_merge"),
+        generate(RUNS / "highway", "highway", "intersection"),
+    ]
+    real = RUNS / "dlr_ut"
+    stylesim("read", "dlr_ut", ROOT / "data" / "dlr_ut", "--out", real, out=real, resumable=True)
+    for corpus in (*simulated, real):
+        label(corpus)
     mixed = RUNS / "mixed"
-    stylesim("merge", *parts, "--balance", "tdbm", "--split", "0.6,0.15,0.25", "--seed", SEED, "--out", mixed, out=mixed)
-    for method in ("tdbm", "kdsc"):
-        stylesim("label", mixed, "--method", method, out=mixed / "labels" / f"{method}.history.json")
-    models = []
-    for condition in ("none", "tdbm"):
-        model = RUNS / f"model_{condition}"
-        models.append(model)
-        stylesim("train", mixed, "--condition", condition, "--seed", SEED, "--epochs", "12", "--out", model, out=model, resumable=True)
+    options = ["--balance", "tdbm", "--split", SPLIT, "--seed", "7"]
+    stylesim("merge", *simulated, real, *options, "--out", mixed, out=mixed, resumable=True)
+    label(mixed)  # does nothing where merging could carry the labels over
+    models = [train(mixed, condition) for condition in ("none", "tdbm")]
     report = RUNS / "report"
-    stylesim("evaluate", *models, "constant_velocity", mixed, "--by", "tdbm,kdsc,scenario,source", "--out", report, out=report)
+    strata = ["--by", "tdbm,kdsc,scenario,source"]
+    stylesim("evaluate", "constant_velocity", *models, mixed, *strata, "--out", report, out=report)
     sys.stdout.write(f"\nDone in {time.monotonic() - begin:.0f} s. The report: {report / 'report.html'}\n")
 
 
