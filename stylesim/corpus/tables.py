@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 import polars as pl
 
-from stylesim.corpus.codec import COLUMNS, decode, encode
+from stylesim.corpus.codec import COLUMNS, HEADING_RAD, POSITION_M, VELOCITY_MPS, decode, encode
 from stylesim.errors import CorpusError
 from stylesim.scene import Scene
 from stylesim.signals import Signals
@@ -19,14 +19,20 @@ from stylesim.style import PHYSICAL_FIELDS, DriverStyle
 from stylesim.tracks import Tracks
 
 DRIVER_PARAMETERS = ("aggressiveness", *PHYSICAL_FIELDS)  # order of the list in `driver_parameters`
+SCALES = {"position_m": str(POSITION_M), "velocity_mps": str(VELOCITY_MPS), "heading_rad": str(HEADING_RAD)}
 ROW_GROUP = 1 << 18  # fixed: the bytes must not depend on the machine
 LEVEL = 9  # of zstd; chosen: 3 % smaller than 3, and encoding is still a small part of a simulation's time
 
 
-def parquet_bytes(frame: pl.DataFrame) -> bytes:
-    """The table as Parquet, always with the same bytes for the same table and polars version."""
+def parquet_bytes(frame: pl.DataFrame, about: dict[str, str] | None = None) -> bytes:
+    """The table as Parquet, always with the same bytes for the same table and polars version.
+
+    `about` goes into the schema metadata of the file.
+    """
     buffer = io.BytesIO()
-    frame.write_parquet(buffer, compression="zstd", compression_level=LEVEL, row_group_size=ROW_GROUP, statistics=False)
+    frame.write_parquet(
+        buffer, compression="zstd", compression_level=LEVEL, row_group_size=ROW_GROUP, statistics=False, metadata=about
+    )
     return buffer.getvalue()
 
 

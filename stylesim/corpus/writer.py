@@ -15,7 +15,7 @@ import polars as pl
 from stylesim.corpus.codec import HEADING_RAD, POSITION_M, VELOCITY_MPS
 from stylesim.corpus.files import json_bytes, sha256_of, storage_error, write_whole
 from stylesim.corpus.roads import write_road
-from stylesim.corpus.tables import DRIVER_PARAMETERS, agents_table, parquet_bytes, signals_table, tracks_table
+from stylesim.corpus.tables import DRIVER_PARAMETERS, SCALES, agents_table, parquet_bytes, signals_table, tracks_table
 from stylesim.errors import CorpusError, InputError
 from stylesim.scene import Scene
 
@@ -55,8 +55,12 @@ def write_part(partial: Path, part: int, scenes: Sequence[Scene], splits: Sequen
         road = "" if scene.road is None else write_road(partial / "roads", scene.road)
         rows.append(_scene_row(scene, splits[number] if splits else "", part, number, road))
     files = {
-        f"{kind}/{name}": write_whole(partial / kind / name, parquet_bytes(table(scenes)))
-        for kind, table in (("tracks", tracks_table), ("agents", agents_table), ("signals", signals_table))
+        f"{kind}/{name}": write_whole(partial / kind / name, parquet_bytes(table(scenes), about))
+        for kind, table, about in (
+            ("tracks", tracks_table, SCALES),
+            ("agents", agents_table, None),
+            ("signals", signals_table, None),
+        )
     }
     write_whole(partial / "records" / f"{part:05d}.json", json_bytes({"scenes": rows, "files": files}))
 

@@ -5,6 +5,7 @@ import json
 from pathlib import Path
 
 import numpy as np
+import polars as pl
 import pytest
 
 from stylesim.corpus import Corpus, CorpusWriter, write_part
@@ -134,3 +135,9 @@ def test_duplicate_scene_ids_are_refused(tmp_path):
     writer.add(make_scene("same"))
     with pytest.raises(CorpusError, match="'same' occurs"):
         writer.finish()
+
+
+def test_the_scales_are_in_the_schema_of_the_file(tmp_path):
+    corpus = write(tmp_path / "c")
+    about = pl.read_parquet_metadata(corpus.path / "tracks" / "part-00000.parquet")
+    assert {name: float(about[name]) for name in corpus.manifest["scales"]} == corpus.manifest["scales"]
