@@ -100,6 +100,7 @@ def train(
     counts = {split: len(data.split(number)) for number, split in enumerate(SPLITS)}
     whole = {**record, "samples": counts, "parameters": parameters, "best_epoch": loop.best_epoch, "curve": loop.curve}
     _write_json(folder / RECORD_FILE, whole)
+    forecaster.training_curve = tuple(loop.curve)
     (folder / STATE_FILE).unlink(missing_ok=True)
     folder.rename(out)
     return forecaster
