@@ -14,7 +14,7 @@ if command -v apt-get >/dev/null; then
     DEBIAN_FRONTEND=noninteractive apt-get install -y -qq --no-install-recommends \
       libx11-6 libxext6 libxrender1 libgl1 libatomic1 >/dev/null
   else
-    echo "Unpacking the system libraries that SUMO needs into .venv (12 packages, about 4 MB) …"
+    echo "Unpacking the system libraries that SUMO needs into .venv (12 packages, about 1.4 MB) …"
     work=$(mktemp -d)
     (cd "$work" && apt-get download -qq libx11-6 libxcb1 libxau6 libxdmcp6 libbsd0 libmd0 libxext6 libxrender1 \
       libgl1 libglvnd0 libglx0 libatomic1)
