@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from enum import IntFlag
 from typing import Any
 
@@ -83,6 +83,28 @@ class StyleLabels:
     def __len__(self) -> int:
         """Number of rows."""
         return len(self.scene_id)
+
+    def rows(self, index: Int[np.ndarray, " chosen"]) -> StyleLabels:
+        """The labels of the chosen rows, in that order."""
+        names = (
+            "start_frame",
+            "stop_frame",
+            "score",
+            "style",
+            "margin",
+            "aggressiveness",
+            "feature",
+            "missing",
+            "flags",
+        )
+        chosen: dict[str, Any] = {name: getattr(self, name)[index] for name in names}
+        for name in ("score_transposed", "style_transposed"):
+            other = getattr(self, name)
+            chosen[name] = None if other is None else other[index]
+        for name in ("scene_id", "agent_id"):
+            ids = getattr(self, name)
+            chosen[name] = tuple(ids[i] for i in index)
+        return replace(self, **chosen)
 
     def class_name(self, row: int) -> str:
         """Name of the class of that row, or "undetermined"."""

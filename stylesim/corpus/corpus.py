@@ -162,7 +162,7 @@ class Corpus:
         return read_labels(self.path, method, span, chosen)
 
     def write_labels(self, chunks: Iterable[StyleLabels]) -> None:
-        """Write labels (all of one method and span) as one new file beside the corpus; streams."""
+        """Write labels as new files beside the corpus, one for each method and span among the chunks; streams."""
         write_labels(
             self.path, chunks, {info.scene_id: info.source_scenario_id for info in self.info}, self.fingerprint
         )

@@ -12,7 +12,8 @@ import numpy as np
 import polars as pl
 
 from stylesim.corpus.files import json_bytes, sha256_of, write_whole
-from stylesim.corpus.tables import parquet_bytes, read_parquet
+from stylesim.corpus.label_file import LabelFile
+from stylesim.corpus.tables import read_parquet
 from stylesim.errors import CorpusError, InputError
 from stylesim.labels import UNDETERMINED, StyleLabels
 
@@ -55,29 +56,46 @@ def labels_table(labels: StyleLabels, source_scenario: Mapping[str, str]) -> pl.
 def write_labels(
     corpus: Path, chunks: Iterable[StyleLabels], source_scenario: Mapping[str, str], fingerprint: str
 ) -> None:
-    """Write the chunks as one file; an older one of that method and span is replaced only when the new one is whole."""
-    tables: list[pl.DataFrame] = []
-    first: StyleLabels | None = None
-    for chunk in chunks:
-        first = first or chunk
-        if (chunk.method, chunk.span, chunk.classes) != (first.method, first.span, first.classes):
-            raise ValueError("all chunks must have one method, span and set of classes")
-        tables.append(labels_table(chunk, source_scenario))
-    if first is None:
-        raise CorpusError(f"{corpus}: there is nothing to label")
-    stem = _stem(corpus, first.method, first.span)
-    parquet = stem.with_name(stem.name + ".parquet")
-    digest = write_whole(parquet, parquet_bytes(pl.concat(tables)))
-    about = {
-        "method": first.method,
-        "span": first.span,
-        "classes": list(first.classes),
-        "features": list(first.feature_names),
-        "provenance": dict(first.provenance),
+    """Write the chunks, one file for each method and span among them, whatever the order they come in.
+
+    Older files are replaced only when all chunks are there; memory does not grow with their number. CorpusError if
+    there is no chunk or the disk is full, ValueError if chunks of one file differ in their classes or features.
+    """
+    files: dict[tuple[str, str], tuple[StyleLabels, LabelFile]] = {}
+    try:
+        for chunk in chunks:
+            key = (chunk.method, chunk.span)
+            if key not in files:
+                stem = _stem(corpus, *key)
+                files[key] = (_empty(chunk), LabelFile(stem.with_name(stem.name + ".parquet")))
+            first, file = files[key]
+            if (chunk.classes, chunk.feature_names) != (first.classes, first.feature_names):
+                raise ValueError("all chunks of one method and span must have the same classes and features")
+            file.add(labels_table(chunk, source_scenario))
+        if not files:
+            raise CorpusError(f"{corpus}: there is nothing to label")
+        for first, file in files.values():
+            about = _about(first, fingerprint) | {"sha256": file.finish()}
+            write_whole(file.path.with_suffix(".json"), json_bytes(about))
+    finally:
+        for _, file in files.values():
+            file.discard()
+
+
+def _empty(labels: StyleLabels) -> StyleLabels:
+    """What the labels have in common, without the labels."""
+    return labels.rows(np.zeros(0, np.int64))
+
+
+def _about(labels: StyleLabels, fingerprint: str) -> dict[str, Any]:
+    return {
+        "method": labels.method,
+        "span": labels.span,
+        "classes": list(labels.classes),
+        "features": list(labels.feature_names),
+        "provenance": dict(labels.provenance),
         "corpus": fingerprint,
-        "sha256": digest,
     }
-    write_whole(stem.with_name(stem.name + ".json"), json_bytes(about))
 
 
 def read_labels(corpus: Path, method: str, span: str, scene_ids: set[str] | None = None) -> StyleLabels:

@@ -2,10 +2,8 @@
 
 from __future__ import annotations
 
-import warnings
-
 import numpy as np
-from jaxtyping import Bool, Float, Float64
+from jaxtyping import Bool, Float64
 
 from stylesim.kinematics import Motion
 from stylesim.labelers.cuts import Cut
@@ -62,28 +60,9 @@ def _by_limit(found: LaneMatch, index: RoadIndex) -> Float64[np.ndarray, "agent 
 def _traffic(
     motion: Motion, is_vehicle: Bool[np.ndarray, "agent time"], cut: Cut
 ) -> Float64[np.ndarray, "agent window"]:
-    """The window's median traffic speed, m/s."""
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore", RuntimeWarning)  # a frame without traffic has no median: NaN is the answer
-        speed: Float[np.ndarray, " time"] = np.nanmedian(np.where(is_vehicle, motion.speed_mps, np.nan), axis=0)
-        agents, windows = cut.window.shape[0], cut.n_windows
-        result = np.full((agents, windows), np.nan)
-        first, last = _bounds(cut)
-        remembered: dict[tuple[int, int], float] = {}
-        for agent, window in zip(*np.nonzero(last >= 0), strict=True):
-            key = (int(first[agent, window]), int(last[agent, window]))
-            if key not in remembered:
-                remembered[key] = float(np.nanmedian(speed[key[0] : key[1] + 1]))
-            result[agent, window] = remembered[key]
+    """The window's median traffic speed, m/s; NaN where it has no frame or no traffic."""
+    from stylesim.labelers.window_kernels import window_traffic
+
+    result = np.full((len(cut.window), cut.n_windows), np.nan)
+    window_traffic(motion.speed_mps, is_vehicle, cut.window, result)
     return result
-
-
-def _bounds(cut: Cut) -> tuple[np.ndarray, np.ndarray]:
-    """First and last frame of each window; -1 where it has none."""
-    agents = cut.window.shape[0]
-    first = np.full((agents, cut.n_windows), -1)
-    last = np.full((agents, cut.n_windows), -1)
-    agent, frame = np.nonzero(cut.window >= 0)
-    last[agent, cut.window[agent, frame]] = frame  # frames ascend: the last one written stays
-    first[agent[::-1], cut.window[agent, frame][::-1]] = frame[::-1]
-    return first, last

@@ -16,19 +16,29 @@ class Cut:
     """Windows of every agent.
 
     `window` numbers the window that a frame counts in (-1: none); `run` the stretch that it is smoothed in (-1 where
-    invalid): the window itself and what is left over beside it, never another window.
+    invalid): the window itself and what is left over beside it, never another window. `block` numbers the stretch of
+    time that a frame is from: frames of different blocks know nothing of each other.
     """
 
     window: Int32[np.ndarray, "agent time"]
     run: Int32[np.ndarray, "agent time"]
+    block: Int32[np.ndarray, " time"]
     n_windows: int
     length_steps: int
 
 
 def whole(valid: Bool[np.ndarray, "agent time"]) -> Cut:
     """One window that holds every frame."""
-    window = np.where(valid, 0, -1).astype(np.int32)
-    return Cut(window=window, run=window, n_windows=1, length_steps=valid.shape[1])
+    return blocks(valid, valid.shape[1])
+
+
+def blocks(valid: Bool[np.ndarray, "agent time"], length_steps: int) -> Cut:
+    """Windows of that length side by side, the same for every agent, each a block of its own."""
+    block = (np.arange(valid.shape[1]) // length_steps).astype(np.int32)
+    window = np.where(valid, block, np.int32(-1))
+    return Cut(
+        window=window, run=window, block=block, n_windows=valid.shape[1] // length_steps, length_steps=length_steps
+    )
 
 
 def tiles(valid: Bool[np.ndarray, "agent time"], length_steps: int) -> Cut:
@@ -49,6 +59,7 @@ def tiles(valid: Bool[np.ndarray, "agent time"], length_steps: int) -> Cut:
     return Cut(
         window=np.where(valid & inside, number, -1).astype(np.int32),
         run=np.where(valid, np.clip(number, 0, most), -1).astype(np.int32),
+        block=np.zeros(frames, np.int32),
         n_windows=int(max(1, count.max(initial=0))),
         length_steps=length_steps,
     )

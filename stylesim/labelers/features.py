@@ -3,15 +3,17 @@
 from __future__ import annotations
 
 from collections import OrderedDict
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from jaxtyping import Bool, Float64, Int32
+from jaxtyping import Bool, Float64, Int, Int32
 
 from stylesim.kinematics import Motion, closing_on_neighbours, displaced, motion
 from stylesim.labelers import cuts, lanes
 from stylesim.labelers.context import highway_share
 from stylesim.labelers.cuts import Cut
+from stylesim.labelers.joining import one_after_another
 from stylesim.labelers.lanes import LaneMatch
 from stylesim.labelers.options import FeatureOptions
 from stylesim.labelers.reduce import frame_count, moments
@@ -53,6 +55,13 @@ class WindowFeatures:
         """Windows that hold (nearly) all of their frames."""
         return self.frames >= cuts.FULL_SHARE * self.length_steps
 
+    def at(self, agent: Int[np.ndarray, "#row #window"], window: Int[np.ndarray, "#row #window"]) -> WindowFeatures:
+        """Chosen windows of chosen agents: one row for each row of the (broadcast) indices."""
+        names = ("value", "frames", "highway", "flags")
+        return WindowFeatures(
+            **{name: getattr(self, name)[agent, window] for name in names}, length_steps=self.length_steps
+        )
+
     def column(self, name: str) -> Float64[np.ndarray, "agent window"]:
         """One feature."""
         return self.value[..., FEATURES.index(name)]
@@ -65,6 +74,30 @@ def window_features(scene: Scene, start: int, length_steps: int, options: Featur
     """
     tracks = scene.tracks.frames(start, start + length_steps)
     return _features(tracks, scene.road, cuts.whole(tracks.valid), options)
+
+
+def joint_features(scenes: Sequence[Scene], options: FeatureOptions) -> WindowFeatures:
+    """Features of each scene as a whole, one window for each, to the same bits as one by one; in one go since short
+    scenes are quickly worked out but slowly called. ValueError unless all have one road, length and set of agents.
+    """
+    first = scenes[0]
+    length, agents = first.tracks.n_frames, first.tracks.agent_id
+    if any(s.road is not first.road or s.tracks.n_frames != length or s.tracks.agent_id != agents for s in scenes):
+        raise ValueError("scenes of one road, length and set of agents are wanted")
+    seen = np.logical_or.reduce([s.tracks.valid.any(axis=1) for s in scenes])
+    tracks = one_after_another([s.tracks for s in scenes], seen)
+    found = _features(tracks, first.road, cuts.blocks(tracks.valid, length), options)
+    shape = (len(agents), len(scenes))
+    result = WindowFeatures(
+        value=np.full((*shape, len(FEATURES)), np.nan),
+        frames=np.zeros(shape, np.int32),
+        highway=np.full(shape, np.nan),
+        flags=np.zeros(shape, np.int32),
+        length_steps=length,
+    )
+    for name in ("value", "frames", "highway", "flags"):
+        getattr(result, name)[seen] = getattr(found, name)
+    return result
 
 
 def tiled_features(scene: Scene, length_steps: int, options: FeatureOptions) -> WindowFeatures:
@@ -94,7 +127,7 @@ def _features(tracks: Tracks, road: Road | None, cut: Cut, options: FeatureOptio
     index = road_index(road, options.leader_range_m)
     moved = motion(tracks.position_m, tracks.heading_rad, cut.run, dt_s=tracks.dt_s, smoother=options.smoother)
     vehicle = tracks.valid & tracks.is_motor[:, None]
-    found = None if index is None else lanes.match(tracks, index, vehicle)
+    found = None if index is None else lanes.match(tracks, index, vehicle, cut.block)
     frames = frame_count(tracks.valid, cut).astype(np.int32)
     flags = np.zeros(frames.shape, np.int32)
     columns = _kinematic(moved, cut)
@@ -147,7 +180,7 @@ def _centre(
     if found is None:
         flags[frames > 0] |= LabelFlag.NO_LANE
         return np.full(frames.shape, np.nan)
-    rate = moments(lanes.straying(found, cut.run, tracks.dt_s, options).rate, cut)
+    rate = moments(lanes.straying(found, cut, tracks.dt_s, options).rate, cut)
     missing = rate.count < LEAST_LANE_SHARE * frames
     flags[missing] |= LabelFlag.NO_LANE
     return np.where(missing, np.nan, rate.mean)

@@ -8,7 +8,6 @@ from jaxtyping import Int
 from stylesim.labelers.base import Labeler
 from stylesim.labels import StyleLabels
 from stylesim.scene import Scene
-from stylesim.windows import WindowSpec
 
 
 def history_labels(
@@ -31,11 +30,3 @@ def history_labels(
     steps = max(1, round(history_s / dt_s))
     index = np.atleast_1d(np.asarray(agents, np.int32))
     return labeler.label_windows(history, [frames - steps], steps, span="history", agents=index)
-
-
-def scene_history_labels(
-    labeler: Labeler, scene: Scene, t0: int, spec: WindowSpec, agents: Int[np.ndarray, " driver"]
-) -> StyleLabels:
-    """Labels of these agents at t0 of a whole scene, of which nothing after t0 is used."""
-    steps = spec.steps(scene.tracks.dt_s)[0]
-    return labeler.label_windows(scene, [t0 - steps + 1], steps, span="history", agents=agents)

@@ -11,12 +11,13 @@ from numba import njit
 @njit(cache=True, nogil=True)
 @no_type_check
 def match_lanes(
-    position, heading, wanted, segment, turn, segment_lane, reach, cell_start, cell_segment, origin, shape, cell_m,
-    least_cosine, metres_per_rad, keep_within_m, lane, along, offset,
+    position, heading, wanted, block, segment, turn, segment_lane, reach, cell_start, cell_segment, origin, shape,
+    cell_m, least_cosine, metres_per_rad, keep_within_m, lane, along, offset,
 ):  # fmt: skip
     """Find the lanes that each wanted vehicle is on, best first.
 
-    position [agent time 2], heading, wanted [agent time], segment and turn as in `RoadIndex`;
+    position [agent time 2], heading, wanted [agent time], block [time] (between blocks nothing is remembered),
+    segment and turn as in `RoadIndex`;
     lane, along, offset [agent time place] are written, lane -1 where there is none.
     """
     agents, frames, places = lane.shape
@@ -24,6 +25,8 @@ def match_lanes(
     for agent in range(agents):
         previous = -1
         for frame in range(frames):
+            if frame > 0 and block[frame] != block[frame - 1]:
+                previous = -1
             if not wanted[agent, frame]:
                 previous = -1
                 continue
@@ -172,10 +175,12 @@ def lane_pieces(lane, offset, run, bridge, jump, piece, changes):
 
 @njit(cache=True, nogil=True)
 @no_type_check
-def near_event(event, within, near):
-    """Mark the frames within that many of an event, before and after it; event, near [agent time]."""
+def near_event(event, block, within, near):
+    """Mark the frames of its block within that many of an event, before and after; event, near [agent time]."""
     agents, frames = event.shape
     for agent in range(agents):
         for frame in range(frames):
             if event[agent, frame]:
-                near[agent, max(0, frame - within) : min(frames, frame + within + 1)] = True
+                for other in range(max(0, frame - within), min(frames, frame + within + 1)):
+                    if block[other] == block[frame]:
+                        near[agent, other] = True

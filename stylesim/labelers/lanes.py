@@ -5,10 +5,11 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from jaxtyping import Bool, Float, Float64, Int, Int32
+from jaxtyping import Bool, Float, Float64, Int32
 
 from stylesim.kinematics import Leaders, Motion, corridor_leaders
 from stylesim.kinematics.smoothing import derivatives
+from stylesim.labelers.cuts import Cut
 from stylesim.labelers.options import FeatureOptions
 from stylesim.labelers.roadindex import CELL_M, EDGE_TOLERANCE_M, RoadIndex
 from stylesim.tracks import Tracks
@@ -38,16 +39,22 @@ class LaneMatch:
     offset_m: Float64[np.ndarray, "agent time place"]
 
 
-def match(tracks: Tracks, index: RoadIndex, wanted: Bool[np.ndarray, "agent time"]) -> LaneMatch:
+def match(
+    tracks: Tracks,
+    index: RoadIndex,
+    wanted: Bool[np.ndarray, "agent time"],
+    block: Int32[np.ndarray, " time"] | None = None,
+) -> LaneMatch:
     """The lanes of every wanted vehicle and frame; where its own track made the centre line, the line without it."""
     from stylesim.labelers.lane_kernels import match_lanes
 
     shape = (*wanted.shape, PLACES)
+    block = np.zeros(shape[1], np.int32) if block is None else block
     result = LaneMatch(np.full(shape, -1, np.int32), np.full(shape, np.nan), np.full(shape, np.nan))
     match_lanes(
-        tracks.position_m, tracks.heading_rad, wanted, index.segment_m, index.segment_turn, index.segment_lane,
-        index.reach_m, index.cell_start, index.cell_segment, index.grid_origin, index.grid_shape, CELL_M,
-        float(np.cos(np.radians(LANE_HEADING_DEG))), METRES_PER_RAD, KEEP_WITHIN_M,
+        tracks.position_m, tracks.heading_rad, wanted, block, index.segment_m, index.segment_turn,
+        index.segment_lane, index.reach_m, index.cell_start, index.cell_segment, index.grid_origin, index.grid_shape,
+        CELL_M, float(np.cos(np.radians(LANE_HEADING_DEG))), METRES_PER_RAD, KEEP_WITHIN_M,
         result.lane, result.along_m, result.offset_m,
     )  # fmt: skip
     _leave_own_track_out(tracks, index, result)
@@ -75,14 +82,14 @@ class Straying:
     changes: Bool[np.ndarray, "agent time"]  # first frame on the new lane
 
 
-def straying(found: LaneMatch, run: Int[np.ndarray, "agent time"], dt_s: float, options: FeatureOptions) -> Straying:
+def straying(found: LaneMatch, cut: Cut, dt_s: float, options: FeatureOptions) -> Straying:
     """What s_center integrates. The offset is smoothed between lane changes, never across one."""
     from stylesim.labelers.lane_kernels import lane_pieces, near_event
 
     lane, raw = np.ascontiguousarray(found.lane[..., 0]), np.ascontiguousarray(found.offset_m[..., 0])
     piece, changes, near = np.full(lane.shape, -1, np.int32), np.zeros(lane.shape, bool), np.zeros(lane.shape, bool)
-    lane_pieces(lane, raw, run, max(1, round(BRIDGE_S / dt_s)), LANE_CHANGE_JUMP_M, piece, changes)
-    near_event(changes, round(options.lane_change_s / dt_s), near)
+    lane_pieces(lane, raw, cut.run, max(1, round(BRIDGE_S / dt_s)), LANE_CHANGE_JUMP_M, piece, changes)
+    near_event(changes, cut.block, round(options.lane_change_s / dt_s), near)
     curve = derivatives(raw[..., None], piece, dt_s, options.smoother)[:, :, 0]
     rate = np.abs(curve[..., 0]) * (options.mu_per_s + np.abs(curve[..., 1]))
     rate[near & (piece >= 0) & np.isfinite(rate)] = 0.0

@@ -5,19 +5,22 @@ from __future__ import annotations
 import warnings
 from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import groupby
 
 import numpy as np
 from jaxtyping import Bool, Float64, Int, Int32
 
 from stylesim.errors import InputError
 from stylesim.labelers.cuts import FULL_SHARE
-from stylesim.labelers.features import FEATURES, WindowFeatures, tiled_features, window_features
+from stylesim.labelers.features import FEATURES, WindowFeatures, joint_features, tiled_features, window_features
 from stylesim.labelers.options import FeatureOptions
 from stylesim.labels import LabelFlag
 from stylesim.scene import Scene
 from stylesim.tracks import TrackFlag
 from stylesim.windows import MIN_HISTORY_S
 
+# Agents times frames that are worked out in one go. Chosen: a few MB for each of the two dozen arrays it takes.
+CELLS = 1 << 16
 _S_FRONT = FEATURES.index("s_front")
 # Said of a driver where it is true of every window that counts; the other flags where it is true of any.
 _ALWAYS = LabelFlag.NO_LEADER | LabelFlag.NO_NEIGHBOURS | LabelFlag.NO_LANE
@@ -67,7 +70,7 @@ def track_rows(
     if agents is None:
         agents = np.flatnonzero(scene.tracks.is_motor & scene.tracks.valid.any(axis=1))
     valid = scene.tracks.valid[agents]
-    value, flags = _average(windows, agents, dt_s)
+    value, flags = _average(windows.at(agents[:, None], np.arange(windows.frames.shape[1])[None]), dt_s)
     flags[scene.tracks.flagged(TrackFlag.IMPLAUSIBLE)[agents]] |= LabelFlag.IMPLAUSIBLE
     return DriverRows(
         span="track",
@@ -83,34 +86,58 @@ def track_rows(
 
 def history_rows(
     scene: Scene,
-    start: int,
+    starts: Sequence[int],
     length_steps: int,
     options: FeatureOptions,
     *,
     agents: Int[np.ndarray, " driver"] | None = None,
 ) -> DriverRows:
-    """What is known of each driver at t0 = start + length_steps - 1, from `scene.history` alone.
+    """What is known of each driver at each t0 = start + length_steps - 1, from `scene.history` alone.
 
-    `start` is negative where the scene is shorter than the history. `agents` None: the motor vehicles seen at t0.
-    InputError if t0 is not within the scene.
+    A start is negative where the scene is shorter than the history. `agents` None: the motor vehicles seen at t0.
+    InputError without starts, or if a t0 is not within the scene.
     """
-    t0 = start + length_steps - 1
-    if not 0 <= t0 < scene.tracks.n_frames:
-        raise InputError(f"scene {scene.scene_id!r} has frames 0 to {scene.tracks.n_frames - 1}; t0 = {t0} is not one")
-    history = scene.history(t0, length_steps)
-    windows = window_features(history, 0, history.tracks.n_frames, options)
+    if not len(starts):
+        raise InputError("no windows to label: give at least one start")
+    for t0 in (start + length_steps - 1 for start in starts):
+        if not 0 <= t0 < scene.tracks.n_frames:
+            raise InputError(
+                f"scene {scene.scene_id!r} has frames 0 to {scene.tracks.n_frames - 1}; t0 = {t0} is not one"
+            )
+    size = max(1, CELLS // max(1, scene.tracks.n_agents * length_steps))
+    parts = []
+    for _, alike in groupby(starts, key=lambda start: min(start, 0)):  # equally many frames
+        group = list(alike)
+        for i in range(0, len(group), size):
+            parts.append(_history_rows(scene, group[i : i + size], length_steps, options, agents))
+    return concatenated(parts)
+
+
+def _history_rows(
+    scene: Scene,
+    starts: Sequence[int],
+    length_steps: int,
+    options: FeatureOptions,
+    agents: Int[np.ndarray, " driver"] | None,
+) -> DriverRows:
+    histories = [scene.history(start + length_steps - 1, length_steps) for start in starts]
+    windows = joint_features(histories, options)
     if agents is None:
-        agents = np.flatnonzero(history.tracks.is_motor & history.tracks.valid[:, -1])
-    value, flags = _average(windows, agents, scene.tracks.dt_s)
-    enough = windows.frames[agents, 0] >= FULL_SHARE * length_steps
-    flags[~enough] |= LabelFlag.SHORT
+        at_t0 = np.stack([h.tracks.valid[:, -1] for h in histories])
+        window, agent = np.nonzero(at_t0 & scene.tracks.is_motor)
+    else:
+        window, agent = np.repeat(np.arange(len(starts)), len(agents)), np.tile(agents, len(starts))
+    chosen = windows.at(agent[:, None], window[:, None])
+    value, flags = _average(chosen, scene.tracks.dt_s)
+    flags[chosen.frames[:, 0] < FULL_SHARE * length_steps] |= LabelFlag.SHORT
+    start = np.asarray(starts, np.int32)[window]
     return DriverRows(
         span="history",
         length_s=length_steps * scene.tracks.dt_s,
-        scene_id=(scene.scene_id,) * len(agents),
-        agent_id=tuple(scene.tracks.agent_id[i] for i in agents),
-        start_frame=np.full(len(agents), max(0, start), np.int32),
-        stop_frame=np.full(len(agents), t0 + 1, np.int32),
+        scene_id=(scene.scene_id,) * len(agent),
+        agent_id=tuple(scene.tracks.agent_id[i] for i in agent),
+        start_frame=np.maximum(start, 0),
+        stop_frame=start + np.int32(length_steps),
         value=value,
         flags=flags,
     )
@@ -145,14 +172,14 @@ def _side_by_side(parts: list[WindowFeatures]) -> WindowFeatures:
 
 
 def _average(
-    windows: WindowFeatures, agents: Int[np.ndarray, " driver"], dt_s: float
+    windows: WindowFeatures, dt_s: float
 ) -> tuple[Float64[np.ndarray, "driver feature"], Int32[np.ndarray, " driver"]]:
     """Mean features and joint flags of the windows that count; NaN for a driver that was seen too shortly."""
-    full = windows.full[agents]
-    long_enough = windows.frames[agents] >= max(1, round(MIN_HISTORY_S / dt_s))
+    full = windows.full
+    long_enough = windows.frames >= max(1, round(MIN_HISTORY_S / dt_s))
     use = np.where(full.any(axis=1, keepdims=True), full, long_enough)
-    value = np.where(use[..., None], windows.value[agents], np.nan)
-    bits = windows.flags[agents]
+    value = np.where(use[..., None], windows.value, np.nan)
+    bits = windows.flags
     with_leader = use & ((bits & LabelFlag.NO_LEADER) == 0)
     # A window without a leader says nothing about the gap that the driver keeps, unless all are such.
     value[..., _S_FRONT] = np.where(with_leader | ~with_leader.any(axis=1, keepdims=True), value[..., _S_FRONT], np.nan)
@@ -160,7 +187,7 @@ def _average(
     flags |= np.bitwise_or.reduce(np.where(use, bits, 0), axis=1) & ~_ALWAYS
     none = ~use.any(axis=1)
     flags[none] = LabelFlag.SHORT
-    highway = np.where(use, windows.highway[agents], np.nan)
+    highway = np.where(use, windows.highway, np.nan)
     flags[_nanmean(highway[..., None])[:, 0] >= 0.5] |= LabelFlag.HIGHWAY  # most of the frames
     return _nanmean(value), flags.astype(np.int32)
 

@@ -10,7 +10,7 @@ from jaxtyping import Int
 
 from stylesim.errors import InputError, unknown
 from stylesim.labelers.options import FeatureOptions
-from stylesim.labelers.rows import DriverRows, concatenated, history_rows, track_rows
+from stylesim.labelers.rows import DriverRows, history_rows, track_rows
 from stylesim.scene import Scene
 
 SPANS = ("track", "history")
@@ -58,4 +58,4 @@ def rows_of(
         return track_rows(scene, options, starts=starts, length_steps=length_steps, agents=agents)
     if starts is None or length_steps is None or not len(starts):
         raise InputError("history labels need the starts of their windows and length_steps")
-    return concatenated([history_rows(scene, start, length_steps, options, agents=agents) for start in starts])
+    return history_rows(scene, starts, length_steps, options, agents=agents)

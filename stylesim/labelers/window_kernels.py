@@ -46,3 +46,41 @@ def window_count(chosen, window, count):
         for frame in range(frames):
             if chosen[agent, frame] and window[agent, frame] >= 0:
                 count[agent, window[agent, frame]] += 1
+
+
+@njit(cache=True, nogil=True)
+@no_type_check
+def window_traffic(speed, is_vehicle, window, traffic):
+    """The median over a window's frames, from its first to its last, of the median speed of the vehicles then.
+
+    speed, is_vehicle, window [agent time]; traffic [agent window] comes as NaN.
+    """
+    agents, frames = window.shape
+    typical = np.full(frames, np.nan)
+    here = np.empty(max(agents, frames))
+    for frame in range(frames):
+        count = 0
+        for agent in range(agents):
+            if is_vehicle[agent, frame] and not np.isnan(speed[agent, frame]):
+                here[count] = speed[agent, frame]
+                count += 1
+        if count > 0:
+            typical[frame] = np.median(here[:count])
+    first, last = np.empty(traffic.shape[1], np.int64), np.empty(traffic.shape[1], np.int64)
+    for agent in range(agents):
+        first[:] = -1
+        for frame in range(frames):
+            at = window[agent, frame]
+            if at >= 0:
+                first[at] = frame if first[at] < 0 else first[at]
+                last[at] = frame
+        for at in range(traffic.shape[1]):
+            if first[at] < 0:
+                continue
+            count = 0
+            for frame in range(first[at], last[at] + 1):
+                if not np.isnan(typical[frame]):
+                    here[count] = typical[frame]
+                    count += 1
+            if count > 0:
+                traffic[agent, at] = np.median(here[:count])

@@ -102,11 +102,11 @@ def test_one_lane_change_is_one_event_and_a_successor_is_none() -> None:
     t = clock()
     change = np.stack([10 * t, LANE_M / (1 + np.exp(-2 * (t - 5)))], axis=1)
     scene = scene_of([change], road=lanes())
-    found = on_lanes.straying(matched(scene), whole(scene.tracks.valid).run, 0.1, FeatureOptions())
+    found = on_lanes.straying(matched(scene), whole(scene.tracks.valid), 0.1, FeatureOptions())
     assert found.changes.sum() == 1
     first = Lane("a", np.array([[-10.0, 0], [50, 0]]), width_m=3.5, successors=("b",))
     road = Road((first, Lane("b", np.array([[50.0, 0], [200, 0]]), width_m=3.5)))
     scene = replace(scene_of([straight(0, 10, 0.3)]), road=road)
-    found = on_lanes.straying(matched(scene), whole(scene.tracks.valid).run, 0.1, FeatureOptions())
+    found = on_lanes.straying(matched(scene), whole(scene.tracks.valid), 0.1, FeatureOptions())
     assert found.changes.sum() == 0
     np.testing.assert_allclose(found.rate, 0.3, atol=1e-6)
