@@ -10,11 +10,11 @@ from jaxtyping import Float32, Int64
 
 from stylesim.errors import InputError
 from stylesim.forecast import Forecast, ForecastTask
+from stylesim.forecasting.allocator import keep_freed_memory
 from stylesim.forecasting.batching import gather, to_scene
 from stylesim.forecasting.conditioner import StyleConditioner
 from stylesim.forecasting.config import ModelConfig
 from stylesim.forecasting.model import ForecastNetwork
-from stylesim.forecasting.objective import selected_modes
 from stylesim.forecasting.samples import RoadCutter, add_window
 from stylesim.forecasting.store import MemorySink, SampleStore, StoreBuilder
 from stylesim.forecasting.tensors import TensorBatch
@@ -35,6 +35,7 @@ class TrainedForecaster:
         self.conditioner = conditioner
         self.training_curve: tuple[Mapping[str, float], ...] = ()  # one record per epoch, where the folder has them
         self._cutter = RoadCutter(network.config.inputs)
+        keep_freed_memory()
 
     @property
     def config(self) -> ModelConfig:
@@ -106,8 +107,7 @@ class TrainedForecaster:
             for index in np.split(np.arange(len(store)), range(BATCH_DRIVERS, len(store), BATCH_DRIVERS)):
                 batch = gather(store, index, config.inputs)
                 style = torch.from_numpy(cond[index]).to(device)
-                last = self.network(TensorBatch.of(batch, device), style)[-1]
-                path, chance = selected_modes(last.mean_m, last.logit, count=config.modes, apart_m=config.nms_m)
+                path, chance = self.network.predict(TensorBatch.of(batch, device), style)
                 paths.append(to_scene(path.cpu().numpy(), batch.pose))
                 chances.append(chance.cpu().numpy())
         return np.concatenate(paths), np.concatenate(chances)

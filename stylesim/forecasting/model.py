@@ -9,51 +9,28 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import torch
-from jaxtyping import Float, Int
+from jaxtyping import Bool, Float, Int
 from torch import Tensor, nn
 
 from stylesim.forecasting.batching import AGENT_ATTRIBUTES, AGENT_FEATURES, PIECE_ATTRIBUTES
 from stylesim.forecasting.config import ModelConfig
+from stylesim.forecasting.head import Head, Modes
 from stylesim.forecasting.intentions import SPEED_EDGES_MPS
 from stylesim.forecasting.layers import DecoderLayer, EncoderLayer, PatchEncoder, Perceptron, scale
+from stylesim.forecasting.selection import selected_queries
 from stylesim.forecasting.style_embedding import StyleContextEmbedding
 from stylesim.forecasting.tensors import TensorBatch
 
 METRE, MPS, SECOND = 0.05, 0.1, 0.2  # features of 20 m, 10 m/s, 5 s become 1
-RESIDUAL_M = 10.0  # an output of 1 moves the end of the path by this much
-SD_START_M, SD_GROWTH_MPS = 0.3, 0.5  # sd that an output of 0 stands for: at t = 0, and its growth
-LOG_SD_RANGE = (-3.0, 5.0)  # 5 cm .. 148 m; MTR clips likewise to keep the likelihood finite [recalled]
 
 
 @dataclass(frozen=True, eq=False)
-class Modes:
-    """A mixture over paths in the target's frame; `intention_m` is where each query was asked to end."""
+class Encoded:
+    """What the decoder looks at; `late` is the style where it enters there."""
 
-    mean_m: Float[Tensor, "batch query time 2"]
-    log_sd: Float[Tensor, "batch query time 2"]
-    logit: Float[Tensor, "batch query"]
-
-
-class Head(nn.Module):
-    """From a query to a path, its spread and its log-odds."""
-
-    def __init__(self, config: ModelConfig) -> None:
-        super().__init__()
-        self.steps = config.inputs.future_steps
-        self.path = Perceptron(config.width, 4 * config.width, 4 * self.steps)
-        self.odds = Perceptron(config.width, config.width, 1)
-        time = torch.arange(1, self.steps + 1, dtype=torch.float32) * config.inputs.dt_s
-        self.register_buffer("reach", (RESIDUAL_M * time / time[-1])[:, None], persistent=False)
-        self.register_buffer("log_sd0", (SD_START_M + SD_GROWTH_MPS * time).log()[:, None], persistent=False)
-        self.reach: Tensor
-        self.log_sd0: Tensor
-
-    def forward(self, query: Float[Tensor, "batch query width"], anchor: Float[Tensor, "batch query time 2"]) -> Modes:
-        """The mixture; a path is its anchor plus what the network adds, which grows with time from 0."""
-        out = self.path(query).unflatten(-1, (self.steps, 4))  # [batch query time 4]
-        mean = anchor + self.reach * out[..., :2]
-        log_sd = (self.log_sd0 + out[..., 2:]).clamp(*LOG_SD_RANGE)
-        return Modes(mean, log_sd, self.odds(query).squeeze(-1))
+    scene: Float[Tensor, "batch token width"]
+    valid: Bool[Tensor, "batch token"]
+    late: Float[Tensor, "batch width"] | None
 
 
 class SceneEncoder(nn.Module):
@@ -152,6 +129,38 @@ class ForecastNetwork(nn.Module):
 
     def forward(self, batch: TensorBatch, style: Int[Tensor, "batch 3"] | None = None) -> list[Modes]:
         """The mixture after every decoder layer, the last one best. `style` rows are (z, k, c), z < 0 unknown."""
+        anchor = self.anchors(batch)
+        encoded = self._encoded(batch, style)
+        query = self._first_query(batch, encoded, anchor)
+        modes: list[Modes] = []
+        for number, head in enumerate(self.heads):
+            end = modes[-1].mean_m[:, :, -1].detach() if modes else None
+            query = self._decoded(number, query, encoded, end)
+            modes.append(head(query, anchor))
+        return modes
+
+    def predict(
+        self, batch: TensorBatch, style: Int[Tensor, "batch 3"] | None = None
+    ) -> tuple[Float[Tensor, "batch mode time 2"], Float[Tensor, "batch mode"]]:
+        """The modes that are kept (`selected_queries`), most probable first, and their probabilities.
+
+        What `forward` and a selection from its last mixture give; but the heads compute only what is asked for:
+        the ends of all queries, the whole paths of the modes that are kept.
+        """
+        anchor = self.anchors(batch)
+        encoded = self._encoded(batch, style)
+        query, end = self._first_query(batch, encoded, anchor), None
+        for number, head in enumerate(self.heads):
+            assert isinstance(head, Head)
+            query = self._decoded(number, query, encoded, end)
+            end = head.mean(query, anchor[:, :, -1:])[:, :, 0]
+        assert isinstance(head, Head) and end is not None
+        logit = head.log_odds(query)
+        kept, chance = selected_queries(end, logit, count=self.config.modes, apart_m=self.config.nms_m)
+        row = torch.arange(len(kept), device=kept.device)[:, None]
+        return head.mean(query[row, kept], anchor[row, kept]), chance
+
+    def _encoded(self, batch: TensorBatch, style: Int[Tensor, "batch 3"] | None) -> Encoded:
         embedding = None
         if self.style is not None:
             unknown = torch.full((len(batch.agent), 3), -1, device=batch.agent.device)
@@ -160,16 +169,27 @@ class ForecastNetwork(nn.Module):
         scene = self.encoder(batch, embedding if fusion == "early" else None)  # [batch token width]
         if fusion == "mid" and embedding is not None:
             scene = added_to_target(scene, embedding)
-        anchor = self.anchors(batch)
+        return Encoded(scene, batch.token_valid, embedding if fusion == "late" else None)
+
+    def _first_query(
+        self, batch: TensorBatch, encoded: Encoded, anchor: Float[Tensor, "batch query time 2"]
+    ) -> Float[Tensor, "batch query width"]:
         velocity = MPS * batch.agent[:, 0, -1, 2:4]
         intention = torch.cat([METRE * anchor[:, :, -1], velocity[:, None].expand(-1, anchor.shape[1], -1)], dim=-1)
-        query = scene[:, :1] + self.intention(intention)  # [batch query width]
-        modes: list[Modes] = []
-        for layer, head in zip(self.layers, self.heads, strict=True):
-            if modes:  # say where the previous layer saw it end
-                query = query + self.revision(METRE * modes[-1].mean_m[:, :, -1].detach())
-            if fusion == "late" and embedding is not None:
-                query = query + embedding[:, None]
-            query = layer(query, scene, batch.token_valid)
-            modes.append(head(query, anchor))
-        return modes
+        query: Tensor = encoded.scene[:, :1] + self.intention(intention)
+        return query
+
+    def _decoded(
+        self,
+        number: int,
+        query: Float[Tensor, "batch query width"],
+        encoded: Encoded,
+        end: Float[Tensor, "batch query 2"] | None,
+    ) -> Float[Tensor, "batch query width"]:
+        """The queries after that decoder layer; `end` is where the previous one saw them end."""
+        if end is not None:
+            query = query + self.revision(METRE * end)
+        if encoded.late is not None:
+            query = query + encoded.late[:, None]
+        decoded: Tensor = self.layers[number](query, encoded.scene, encoded.valid)
+        return decoded

@@ -9,7 +9,8 @@ from torch import Tensor
 
 from stylesim.forecasting.data import Example, TrainingData
 from stylesim.forecasting.model import ForecastNetwork
-from stylesim.forecasting.objective import mixture_loss, selected_modes
+from stylesim.forecasting.objective import mixture_loss
+from stylesim.forecasting.selection import selected_modes
 from stylesim.randomness import stream
 
 MOST_SAMPLES = 2048  # chosen: a few seconds on two cores; which ones depends on the seed only

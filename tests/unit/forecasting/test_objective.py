@@ -4,8 +4,9 @@ import math
 
 import torch
 
-from stylesim.forecasting.model import Modes
-from stylesim.forecasting.objective import mixture_loss, responsible_query, selected_modes
+from stylesim.forecasting.head import Modes
+from stylesim.forecasting.objective import mixture_loss, responsible_query
+from stylesim.forecasting.selection import selected_modes
 
 
 def paths(ends: list[tuple[float, float]]) -> torch.Tensor:
