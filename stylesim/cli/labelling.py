@@ -5,12 +5,16 @@ from __future__ import annotations
 from collections import Counter
 from enum import StrEnum
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import typer
 
 from stylesim.cli.console import progress_bar, say, show_table
 from stylesim.labels import StyleLabels
 from stylesim.windows import WindowSpec
+
+if TYPE_CHECKING:
+    from stylesim.labelers.scaler import FeatureScaler
 
 
 class Method(StrEnum):
@@ -27,6 +31,12 @@ def _shares(labels: StyleLabels) -> list[tuple[str, int, str]]:
     ]
 
 
+def _clamped(scaler: FeatureScaler, labels: StyleLabels) -> list[tuple[str, str, str]]:
+    from stylesim.labelers.scaler import clamped_shares
+
+    return [(name, f"{low:.3f}", f"{high:.3f}") for name, (low, high) in clamped_shares(scaler, labels).items()]
+
+
 def label(
     corpus: Path = typer.Argument(help="A corpus."),
     method: Method = typer.Option(Method.tdbm, help="How to label."),
@@ -41,6 +51,7 @@ def label(
     from stylesim.corpus import Corpus
     from stylesim.labelers.labelling import label as run
     from stylesim.labelers.reference import default_labeler, new_labeler
+    from stylesim.labelers.tdbm import TDBM
 
     spec = WindowSpec(window, future, stride)
     if fit is None:
@@ -51,6 +62,9 @@ def label(
     with progress_bar(f"labelling {corpus.name} by {method.value}", "scenes") as progress:
         labels = run(Corpus(corpus), labeler, spec=spec, progress=progress)
     show_table(f"{method.value}: {len(labels)} tracks", ("style", "tracks", "share"), _shares(labels))
+    if isinstance(labeler, TDBM):  # KDSC clamps nothing
+        shares = _clamped(labeler.track_scaler_, labels)
+        show_table("share of each feature clamped", ("feature", "below the scale", "above the scale"), shares)
     say(f"{corpus / 'labels'}")
 
 
