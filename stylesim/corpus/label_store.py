@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -17,6 +17,8 @@ from stylesim.corpus.tables import read_parquet
 from stylesim.errors import CorpusError, InputError
 from stylesim.labels import UNDETERMINED, StyleLabels
 
+# Rows of a table in memory. Chosen: some hundred times what it costs to make an empty one.
+TABLE_ROWS = 1 << 13
 _PLAIN = ("start_frame", "stop_frame", "margin", "aggressiveness", "flags")
 
 
@@ -29,28 +31,38 @@ def has_labels(corpus: Path, method: str, span: str) -> bool:
     return _stem(corpus, method, span).with_name(f"{method}.{span}.json").is_file()
 
 
-def labels_table(labels: StyleLabels, source_scenario: Mapping[str, str]) -> pl.DataFrame:
-    """One row per label; scores, features and missing flags as one column each."""
-    name_of = [*labels.classes, "undetermined"]
+def labels_table(chunks: Sequence[StyleLabels], source_scenario: Mapping[str, str]) -> pl.DataFrame:
+    """One row per label of chunks that are alike; scores, features and missing flags as one column each."""
+    first = chunks[0]
+    name_of = np.array([*first.classes, "undetermined"], object)  # the index UNDETERMINED is -1: the last
+
+    def joined(name: str) -> np.ndarray:
+        return np.concatenate([getattr(chunk, name) for chunk in chunks])
+
+    scenes = [scene for chunk in chunks for scene in chunk.scene_id]
+    agents = [agent for chunk in chunks for agent in chunk.agent_id]
     columns: dict[str, Any] = {
-        "scene_id": labels.scene_id,
-        "agent_id": labels.agent_id,
-        "source_scenario_id": [source_scenario.get(scene, scene) for scene in labels.scene_id],
-        "source_track_id": labels.agent_id,
-        "style": [name_of[i] for i in labels.style],
-        **{name: getattr(labels, name) for name in _PLAIN},
+        "scene_id": scenes,
+        "agent_id": agents,
+        "source_scenario_id": [source_scenario.get(scene, scene) for scene in scenes],
+        "source_track_id": agents,
+        "style": name_of[joined("style")],
+        **{name: joined(name) for name in _PLAIN},
     }
-    for i, name in enumerate(labels.classes):
-        columns[f"score.{name}"] = labels.score[:, i]
-    if labels.score_transposed is not None and labels.style_transposed is not None:
-        columns["style_transposed"] = [name_of[i] for i in labels.style_transposed]
-        for i, name in enumerate(labels.classes):
-            columns[f"score_transposed.{name}"] = labels.score_transposed[:, i]
-    for i, name in enumerate(labels.feature_names):
-        columns[f"feature.{name}"] = labels.feature[:, i]
-        columns[f"missing.{name}"] = labels.missing[:, i]
+    columns |= _columns("score", first.classes, joined("score"))
+    if first.score_transposed is not None and first.style_transposed is not None:
+        columns["style_transposed"] = name_of[joined("style_transposed")]
+        columns |= _columns("score_transposed", first.classes, joined("score_transposed"))
+    feature = _columns("feature", first.feature_names, joined("feature"))
+    missing = _columns("missing", first.feature_names, joined("missing"))
+    for pair in zip(feature.items(), missing.items(), strict=True):
+        columns |= dict(pair)
     texts = ("scene_id", "agent_id", "source_scenario_id", "source_track_id", "style", "style_transposed")
     return pl.DataFrame(columns, schema_overrides={name: pl.String for name in texts if name in columns})
+
+
+def _columns(prefix: str, names: Sequence[str], matrix: np.ndarray) -> dict[str, np.ndarray]:
+    return {f"{prefix}.{name}": np.ascontiguousarray(matrix[:, i]) for i, name in enumerate(names)}
 
 
 def write_labels(
@@ -61,30 +73,48 @@ def write_labels(
     Older files are replaced only when all chunks are there; memory does not grow with their number. CorpusError if
     there is no chunk or the disk is full, ValueError if chunks of one file differ in their classes or features.
     """
-    files: dict[tuple[str, str], tuple[StyleLabels, LabelFile]] = {}
+    files: dict[tuple[str, str], _Growing] = {}
     try:
         for chunk in chunks:
             key = (chunk.method, chunk.span)
             if key not in files:
                 stem = _stem(corpus, *key)
-                files[key] = (_empty(chunk), LabelFile(stem.with_name(stem.name + ".parquet")))
-            first, file = files[key]
-            if (chunk.classes, chunk.feature_names) != (first.classes, first.feature_names):
-                raise ValueError("all chunks of one method and span must have the same classes and features")
-            file.add(labels_table(chunk, source_scenario))
+                files[key] = _Growing(LabelFile(stem.with_name(stem.name + ".parquet")), source_scenario, chunk)
+            files[key].add(chunk)
         if not files:
             raise CorpusError(f"{corpus}: there is nothing to label")
-        for first, file in files.values():
-            about = _about(first, fingerprint) | {"sha256": file.finish()}
-            write_whole(file.path.with_suffix(".json"), json_bytes(about))
+        for file in files.values():
+            about = _about(file.kind, fingerprint) | {"sha256": file.finish()}
+            write_whole(file.file.path.with_suffix(".json"), json_bytes(about))
     finally:
-        for _, file in files.values():
-            file.discard()
+        for file in files.values():
+            file.file.discard()
 
 
-def _empty(labels: StyleLabels) -> StyleLabels:
-    """What the labels have in common, without the labels."""
-    return labels.rows(np.zeros(0, np.int64))
+class _Growing:
+    """Labels on their way to one file, a table for many small chunks: making one takes longer than filling it."""
+
+    def __init__(self, file: LabelFile, source_scenario: Mapping[str, str], first: StyleLabels) -> None:
+        self.file, self.source_scenario = file, source_scenario
+        self.kind = first.rows(np.zeros(0, np.int64))  # what all have in common
+        self._waiting: list[StyleLabels] = []
+        self._rows = 0
+
+    def add(self, chunk: StyleLabels) -> None:
+        if (chunk.classes, chunk.feature_names) != (self.kind.classes, self.kind.feature_names):
+            raise ValueError("all chunks of one method and span must have the same classes and features")
+        self._waiting.append(chunk)
+        self._rows += len(chunk)
+        if self._rows >= TABLE_ROWS:
+            self._flush()
+
+    def finish(self) -> str:
+        self._flush()
+        return self.file.finish()
+
+    def _flush(self) -> None:
+        self.file.add(labels_table([self.kind, *self._waiting], self.source_scenario))
+        self._waiting, self._rows = [], 0
 
 
 def _about(labels: StyleLabels, fingerprint: str) -> dict[str, Any]:
@@ -109,11 +139,14 @@ def read_labels(corpus: Path, method: str, span: str, scene_ids: set[str] | None
         raise CorpusError(f"{stem}.json is damaged: {error}") from error
     path = stem.with_name(stem.name + ".parquet")
     table = read_parquet(path)
-    if sha256_of(path) != about["sha256"]:
-        raise CorpusError(f"{path} does not match its checksum; label the corpus again")
-    if scene_ids is not None:
-        table = table.filter(pl.col("scene_id").is_in(list(scene_ids)))
-    return _labels(table, about)
+    try:
+        if sha256_of(path) != about["sha256"]:
+            raise CorpusError(f"{path} does not match its checksum; label the corpus again")
+        if scene_ids is not None:
+            table = table.filter(pl.col("scene_id").is_in(list(scene_ids)))
+        return _labels(table, about)
+    except (KeyError, TypeError, ValueError, pl.exceptions.PolarsError) as error:
+        raise CorpusError(f"{stem}.json (or the .parquet beside it) is damaged: {error!r}; label again") from error
 
 
 def export_csv(corpus: Path, method: str, span: str, out: Path) -> int:
