@@ -87,6 +87,23 @@ def gather(store: SampleStore, index: Int64[np.ndarray, " batch"], config: Input
     return Batch(agent, attribute, agent_valid, piece, piece_attribute, piece_valid, pose)
 
 
+def _in_frame(
+    state: Float32[np.ndarray, "batch agent time 6"], pose: Float32[np.ndarray, "batch 3"]
+) -> Float32[np.ndarray, "batch agent time 7"]:
+    """States as the network takes them, all 0 where not seen; written in place, since this is most of `gather`."""
+    x0, y0, turn = (column[:, None, None] for column in pose.T)
+    c, s = np.cos(turn), np.sin(turn)
+    out = np.empty((*state.shape[:3], AGENT_FEATURES), np.float32)
+    for place, first, (u0, v0) in ((0, STATE_X, (x0, y0)), (2, STATE_VX, (0.0, 0.0))):
+        u, v = state[..., first] - u0, state[..., first + 1] - v0
+        out[..., place], out[..., place + 1] = c * u + s * v, c * v - s * u
+    heading = state[..., STATE_HEADING] - turn
+    out[..., 4], out[..., 5] = np.cos(heading), np.sin(heading)
+    out[..., 6] = state[..., STATE_VALID]
+    out[..., :6] *= out[..., 6:]
+    return out
+
+
 def _agents(
     store: SampleStore,
     snapshot: Int64[np.ndarray, " batch"],
@@ -100,19 +117,8 @@ def _agents(
     # Agents on one spot (a simulator's fault) must not push the target from its place.
     elsewhere = np.where(rows[:, 1:] == target[:, None], rows[:, :1], rows[:, 1:])
     rows = np.concatenate([target[:, None], elsewhere], axis=1)
-    state = np.asarray(store.agent_state[rows])
-    seen = state[..., STATE_VALID] > 0
-    heading = state[..., STATE_HEADING] - pose[:, None, None, 2]
-    agent = np.concatenate(
-        [
-            to_target(state[..., STATE_X : STATE_X + 2] - pose[:, None, None, :2], pose[:, 2]),
-            to_target(state[..., STATE_VX : STATE_VX + 2], pose[:, 2]),
-            np.stack([np.cos(heading), np.sin(heading)], axis=-1),
-            state[..., STATE_VALID : STATE_VALID + 1],
-        ],
-        axis=-1,
-    )
-    agent[~(seen & valid[..., None])] = 0.0
+    agent = _in_frame(np.asarray(store.agent_state[rows]), pose)
+    agent *= valid[..., None, None]  # states are finite, and 0 where the agent was not seen
     raw = np.asarray(store.agent_attribute[rows])
     kind = raw[..., 2:] == np.arange(len(AgentKind), dtype=np.float32)
     is_target = np.broadcast_to(np.arange(config.agents) == 0, rows.shape)

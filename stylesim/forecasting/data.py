@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Iterator
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 import torch
-from jaxtyping import Float, Float32, Int64
+from jaxtyping import Float, Float32, Float64, Int64
 from torch import Tensor
 
 from stylesim.errors import InputError
@@ -50,18 +52,42 @@ class TrainingData:
         """The samples of split 0 (train) or 1 (val)."""
         return np.flatnonzero(self.store.origin[:, 3] == number)
 
+    @property
+    def without_weight(self) -> int:
+        """How many training samples have no weight although the corpus has weights."""
+        return int(np.isnan(self.store.weight[self.split(0)]).sum())
+
+    @cached_property
+    def weight(self) -> Float64[np.ndarray, " train"]:
+        """Sampling weight of each training sample.
+
+        Samples that the corpus's weights leave out get the mean of the others, and a warning says how many they are.
+        InputError where they leave out all, or are no weights.
+        """
+        weight = self.store.weight[self.split(0)].astype(np.float64)
+        missing = np.isnan(weight)
+        advice = "balance the corpus anew (`stylesim balance`), or merge it anew"
+        if missing.all():
+            raise InputError(f"the corpus has sampling weights, but for none of its {len(weight)} samples; {advice}")
+        if missing.any():
+            text = f"{missing.sum()} of {len(weight)} training samples have no sampling weight; they get the mean"
+            warnings.warn(f"{text}. To have them weighted, {advice}", stacklevel=2)
+            weight[missing] = weight[~missing].mean()
+        if not (np.isfinite(weight).all() and (weight >= 0).all() and weight.sum() > 0):
+            raise InputError(f"sampling weights must be numbers >= 0, not all 0; {advice}")
+        return weight
+
     def epoch(
         self, epoch: int, *, seed: int, batch_size: int, rank: int = 0, world: int = 1
     ) -> list[Int64[np.ndarray, " batch"]]:
         """The index batches of one epoch: as many draws as there are training samples.
 
-        Equal weights: each sample once, in random order. Else: drawn with replacement, by weight.
+        Equal weights: each sample once, in random order. Else: drawn with replacement, by weight, from the training
+        split only.
         """
         rng = stream(seed, epoch, "", "sampler")
         index = self.split(0)
-        weight = self.store.weight[index].astype(np.float64)
-        if not (np.isfinite(weight).all() and (weight >= 0).all() and weight.sum() > 0):
-            raise InputError("sampling weights must be numbers >= 0, not all 0; merge the corpus anew")
+        weight = self.weight
         if (weight == weight[0]).all():
             order = rng.permutation(index)
         else:

@@ -102,7 +102,8 @@ class TrainedForecaster:
         device = next(self.network.parameters()).device
         paths = [np.zeros((0, config.modes, config.inputs.future_steps, 2), np.float32)]
         chances = [np.zeros((0, config.modes), np.float32)]
-        self.network.eval()
+        if self.network.training:  # asked first, since to set it costs a millisecond
+            self.network.eval()
         with torch.inference_mode():
             for index in np.split(np.arange(len(store)), range(BATCH_DRIVERS, len(store), BATCH_DRIVERS)):
                 batch = gather(store, index, config.inputs)

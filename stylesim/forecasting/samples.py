@@ -23,7 +23,7 @@ from stylesim.scene import Scene
 from stylesim.windows import WindowSpec, anchor_frames, target_agents
 
 SPLITS = ("train", "val")
-STORE_FORMAT = 1  # raise it when the arrays of the store change meaning
+STORE_FORMAT = 2  # raise it when the arrays of the store change meaning
 Progress = Callable[[int, int], None]
 
 
@@ -97,6 +97,7 @@ def store_key(corpus: Corpus, spec: WindowSpec, config: InputConfig) -> str:
         "scenes": [(info.scene_id, info.split) for info in corpus.info],
         "spec": asdict(spec),
         "inputs": asdict(config),
+        "weights": sorted(corpus.weights().items()),  # may come later than the corpus, by `stylesim balance`
     }
     return hashlib.sha256(json.dumps(parts, sort_keys=True).encode()).hexdigest()[:24]
 
@@ -126,7 +127,7 @@ def _compile(
     corpus: Corpus, spec: WindowSpec, config: InputConfig, builder: StoreBuilder, progress: Progress | None
 ) -> None:
     weights = corpus.weights()
-    usual = float(np.mean(list(weights.values()))) if weights else 1.0
+    unknown = np.nan if weights else 1.0  # `TrainingData` says how many of the training samples have none
     cutter = RoadCutter(config)
     for window in windows(corpus, spec, progress=progress):
         scene, targets = window.scene, window.targets
@@ -138,6 +139,6 @@ def _compile(
         builder.samples(
             rows,
             origin=origin,
-            weight=np.array([weights.get(key, usual) for key in keys], np.float32),
+            weight=np.array([weights.get(key, unknown) for key in keys], np.float32),
             future_m=scene.tracks.position_m[targets, window.t0 + 1 : window.t0 + 1 + config.future_steps],
         )

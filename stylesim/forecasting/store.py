@@ -156,10 +156,13 @@ class StoreBuilder:
         self._sink = sink
         self._agents = self._pieces = self._roads = self._snapshots = self._lanes = 0
         self._known_roads: dict[bytes, int] = {}
+        self._last_road: tuple[RoadArrays, int] | None = None  # most drivers of a scene see the same one
         self.n_samples = 0
 
     def road(self, arrays: RoadArrays) -> int:
         """The number of a road; one of equal content is stored once."""
+        if self._last_road is not None and self._last_road[0] is arrays:
+            return self._last_road[1]
         key = sha256(arrays.points_m.tobytes() + arrays.attribute.tobytes() + arrays.lane.tobytes()).digest()
         if key not in self._known_roads:
             first = self._pieces
@@ -169,6 +172,7 @@ class StoreBuilder:
             self._sink.append("road_pieces", np.array([[first, self._pieces]], np.int64))
             self._known_roads[key] = self._roads
             self._roads += 1
+        self._last_road = arrays, self._known_roads[key]
         return self._known_roads[key]
 
     def snapshot(self, agents: AgentArrays, signals: Float32[np.ndarray, "lane 2"] | None) -> tuple[int, int]:

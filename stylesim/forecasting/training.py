@@ -98,6 +98,7 @@ def train(
     save(forecaster, folder / MODEL_FILE)
     parameters = sum(p.numel() for p in network.parameters())
     counts = {split: len(data.split(number)) for number, split in enumerate(SPLITS)}
+    counts["train_without_weight"] = data.without_weight
     whole = {**record, "samples": counts, "parameters": parameters, "best_epoch": loop.best_epoch, "curve": loop.curve}
     _write_json(folder / RECORD_FILE, whole)
     forecaster.training_curve = tuple(loop.curve)

@@ -12,6 +12,7 @@ from stylesim.forecasting.batching import gather
 from stylesim.forecasting.config import FUSIONS, InputConfig, ModelConfig, model_config
 from stylesim.forecasting.model import ForecastNetwork
 from stylesim.forecasting.samples import RoadCutter, add_window
+from stylesim.forecasting.selection import selected_modes
 from stylesim.forecasting.store import MemorySink, StoreBuilder
 from stylesim.forecasting.tensors import TensorBatch
 from stylesim.scene import Scene
@@ -125,3 +126,14 @@ def test_an_impossible_network_is_refused(changes: dict[str, Any]) -> None:
         model_config("tiny", INPUTS, **changes)
     with pytest.raises(InputError, match="Did you mean 'tiny'"):
         model_config("tinny", INPUTS)
+
+
+@pytest.mark.parametrize("fusion", FUSIONS)
+def test_prediction_gives_what_the_last_mixture_and_a_selection_give(fusion: str) -> None:
+    net, inputs = network(styles=2, fusion=fusion), inputs_of(make_scene())
+    with torch.no_grad():
+        last = net(inputs, STYLE)[-1]
+        expected = selected_modes(last.mean_m, last.logit, count=net.config.modes, apart_m=net.config.nms_m)
+        found = net.predict(inputs, STYLE)
+    for one, other in zip(found, expected, strict=True):
+        torch.testing.assert_close(one, other, atol=1e-4, rtol=0)

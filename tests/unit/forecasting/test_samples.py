@@ -102,6 +102,40 @@ def test_heavier_drivers_are_drawn_more_often(tmp_path: Path) -> None:
     assert 4.5 < ratio < 8.0
 
 
+def test_a_driver_without_weight_gets_the_mean_and_is_counted_aloud(tmp_path: Path) -> None:
+    with CorpusWriter(tmp_path / "c", source="made", configuration={}) as writer:
+        writer.add(make_scene("a", n_frames=90), split="train")
+        writer.add(make_scene("b", n_frames=90, seed=1), split="val")
+        corpus = writer.finish(weights={("a", "car-0"): 1.0, ("a", "car-1"): 3.0, ("b", "car-0"): 99.0})
+    data = data_of(corpus, tmp_path / "cache")
+    agent = data.store.origin[data.split(0), 2]
+    missing = int((agent > 1).sum())
+    assert data.without_weight == missing > 0
+    with pytest.warns(UserWarning, match=f"{missing} of {len(agent)} training samples have no sampling weight"):
+        weight = data.weight
+    usual = weight[agent <= 1].mean()
+    assert set(weight[agent > 1]) == {usual}
+    assert set(weight[agent == 1]) == {3.0}
+
+
+def test_weights_of_other_scenes_are_refused(tmp_path: Path) -> None:
+    with CorpusWriter(tmp_path / "c", source="made", configuration={}) as writer:
+        writer.add(make_scene("a", n_frames=90), split="train")
+        writer.add(make_scene("b", n_frames=90, seed=1), split="val")
+        corpus = writer.finish(weights={("elsewhere", "car-0"): 1.0})
+    with pytest.raises(InputError, match="for none of its"):
+        data_of(corpus, tmp_path / "cache").epoch(0, seed=0, batch_size=8)
+
+
+def test_weights_that_came_later_are_not_taken_from_the_cache(tmp_path: Path) -> None:
+    corpus = weighted(tmp_path / "c")
+    before = data_of(corpus, tmp_path / "cache")
+    corpus.write_weights({("a", f"car-{i}"): 1.0 + i for i in range(5)}, by="tdbm")
+    after = data_of(Corpus(tmp_path / "c"), tmp_path / "cache")
+    assert sorted(set(before.weight)) == [1.0, 6.0]
+    assert sorted(set(after.weight)) == [1.0, 2.0, 3.0, 4.0, 5.0]
+
+
 def test_with_equal_weights_an_epoch_takes_each_sample_once(tmp_path: Path) -> None:
     data = data_of(made_corpus(tmp_path / "c"), tmp_path / "cache")
     batches = data.epoch(0, seed=0, batch_size=1)
