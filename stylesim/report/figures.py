@@ -98,6 +98,9 @@ def error_figure(evaluations: Sequence[Evaluation], by: str, *, metric: str = "m
     return figure
 
 
+LEGEND_ROOM = 0.45  # of the height, above the curves; chosen: two models' legend fits
+
+
 def finite_pairs(curve: Curve, name: str) -> tuple[list[float], list[float]]:
     """(epochs, values) of one quantity of a training record, where it was measured."""
     found = [(point.get("epoch"), point.get(name, point.get(name.removeprefix("val_")))) for point in curve]
@@ -131,6 +134,7 @@ def loss_figure(curves: Mapping[str, Curve]) -> Figure | None:
             axes.set_xlabel("epoch")
             axes.set_ylabel(unit)
             axes.xaxis.set_major_locator(MaxNLocator(integer=True))
+            low, high = axes.get_ylim()
+            axes.set_ylim(low, high + LEGEND_ROOM * (high - low))
             axes.legend(loc="upper right")
-        right.set_ylim(bottom=0)
     return figure

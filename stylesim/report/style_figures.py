@@ -8,16 +8,18 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from scipy.special import expit
+from scipy.stats import binomtest
 
 from stylesim.evaluation.label_summary import RANK_CEILING, LabelSummary, SourceSummary
 from stylesim.evaluation.yellow import MAX_TTS_S, YellowDecisions
-from stylesim.report.theme import SERIES_COLOUR, UNJUDGED_COLOUR, drawing, new_figure, style_colour, style_marker
+from stylesim.report.theme import SERIES_COLOUR, UNJUDGED_COLOUR, drawing, new_figure, style_colour
 from stylesim.style import STYLE_CLASSES
 
 WIDTH = 8.6
 NEUTRAL_YELLOW = (2.14, 2.88)  # (k 1/s, m s), REFERENCE section 5: Rakha et al. 2007, drivers under 40
-PER_POINT = 12  # chosen: decisions behind one point at least; a share of fewer says nothing
-MOST_POINTS = 8  # chosen: more points of one style hide the others
+PER_POINT = 8  # chosen: decisions behind one point at least; a share of fewer says nothing
+ROW = 0.045  # of the axis, between the rows of ticks
+TTS_BIN_S = 1.0  # chosen: the curve rises over about 2 s; a point must not mix drivers who go with drivers who stop
 
 
 def _share_panel(axes: Axes, sources: Sequence[tuple[str, SourceSummary]], title: str, *, transposed: bool) -> None:
@@ -104,25 +106,44 @@ def rank_note(summary: LabelSummary) -> str:
 
 
 def stop_probability_figure(decisions: YellowDecisions) -> Figure:
-    """Share of drivers that decided to stop, by time to the stop line at the onset of yellow and commanded style."""
+    """Who decided to stop, by time to the stop line at the onset of yellow and commanded style.
+
+    Every decision is a tick, those to stop above, those to go below, one row per style; the points are shares of all
+    styles together in bins, with Wilson 95 % intervals.
+    """
     k, m = NEUTRAL_YELLOW
     style = np.array(decisions.style, dtype=object)
     with drawing():
-        figure, (axes,) = new_figure(WIDTH, 3.6)
+        figure, (axes,) = new_figure(WIDTH, 4.4)
         fine = np.linspace(0, MAX_TTS_S, 200)
-        neutral = f"neutral driver of the literature (k = {k} 1/s, m = {m} s)"
+        neutral = f"literature (k {k} 1/s, m {m} s)"
         axes.plot(fine, expit(k * (fine - m)), color=UNJUDGED_COLOUR, ls="--", lw=1.4, label=neutral)
-        for name in [c for c in (*STYLE_CLASSES, "neutral") if (style == c).any()]:
+        _pooled(axes, decisions)
+        present = [name for name in (*STYLE_CLASSES, "neutral") if (style == name).any()]
+        for row, name in enumerate(present, start=1):
             tts, stopped = decisions.tts_s[style == name], decisions.stopped[style == name]
-            groups = np.array_split(np.argsort(tts, kind="stable"), min(MOST_POINTS, max(1, len(tts) // PER_POINT)))
-            drawn = [group for group in groups if len(group) >= PER_POINT]
-            middle, share = [tts[group].mean() for group in drawn], [stopped[group].mean() for group in drawn]
-            label = f"{name}, n = {len(tts)}"
-            axes.plot(middle, share, style_marker(name) + "-", color=style_colour(name), ms=5.5, lw=1.3, label=label)
+            place = np.where(stopped, 1.0 + ROW * row, -ROW * row)
+            axes.scatter(tts, place, marker="|", s=26, color=style_colour(name), label=f"{name}, n = {len(tts)}")
         axes.set_xlim(0, MAX_TTS_S)
-        axes.set_ylim(-0.03, 1.03)
+        axes.set_ylim(-ROW * (len(present) + 1), 1 + ROW * (len(present) + 1))
+        axes.set_yticks(np.linspace(0, 1, 6))
         axes.set_xlabel("time to the stop line at the onset of yellow (s)")
         axes.set_ylabel("share that decides to stop")
-        axes.set_title(f"Stop or go at the yellow by commanded style, each point {PER_POINT} decisions or more")
+        axes.set_title("Stop (ticks above) or go (below) at the yellow, by commanded style")
         figure.legend(loc="outside lower center", ncols=4)
     return figure
+
+
+def _pooled(axes: Axes, decisions: YellowDecisions) -> None:
+    """Shares of all styles together, in bins of at least PER_POINT decisions."""
+    place = np.floor(decisions.tts_s / TTS_BIN_S)
+    bins = [place == number for number in range(int(MAX_TTS_S / TTS_BIN_S)) if (place == number).sum() >= PER_POINT]
+    if not bins:
+        return
+    found = [binomtest(int(decisions.stopped[b].sum()), int(b.sum())) for b in bins]
+    share = np.array([test.statistic for test in found])
+    ends = np.array([test.proportion_ci(method="wilson") for test in found])
+    middle = [decisions.tts_s[b].mean() for b in bins]
+    label = f"all styles, {TTS_BIN_S:g} s bins"
+    error = [share - ends[:, 0], ends[:, 1] - share]
+    axes.errorbar(middle, share, yerr=np.maximum(error, 0), fmt="o", ms=4.5, lw=1.2, color="#1f2933", label=label)
