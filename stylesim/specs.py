@@ -12,9 +12,9 @@ from stylesim.errors import InputError, nearest
 
 
 class Spec(BaseModel):
-    """Base of every model that is read from a file: frozen, and an unknown key is an error."""
+    """Base of every model that is read from a file: frozen; an unknown key, infinity or NaN is an error."""
 
-    model_config = ConfigDict(extra="forbid", frozen=True)
+    model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
 
 
 SpecT = TypeVar("SpecT", bound=Spec)
@@ -57,6 +57,8 @@ def load_yaml(model: type[SpecT], path: Path) -> SpecT:
         raw = yaml.safe_load(path.read_text(encoding="utf-8"))
     except FileNotFoundError:
         raise InputError(f"no such file: {path}") from None
+    except OSError as error:
+        raise InputError(f"cannot read {path}: {error.strerror or error}") from None
     except (yaml.YAMLError, UnicodeDecodeError) as error:
         raise InputError(f"{path} is not a YAML file: {error}") from None
     return parse(model, raw, path)

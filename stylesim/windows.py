@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
 from jaxtyping import Int32
 
+from stylesim.errors import InputError
 from stylesim.scene import Scene
 
 MIN_HISTORY_S = 1.0  # REFERENCE: style_cond from >= 1 s of history, else the null token
@@ -25,9 +27,11 @@ class WindowSpec:
     stride_s: float = 3.0
 
     def __post_init__(self) -> None:
-        """Check that every length is positive."""
-        if not (self.history_s > 0 and self.future_s > 0 and self.stride_s > 0):
-            raise ValueError(f"history, future and stride must be positive: {self}")
+        """InputError unless every length is a positive number."""
+        for name in ("history", "future", "stride"):
+            seconds = getattr(self, f"{name}_s")
+            if not (math.isfinite(seconds) and seconds > 0):
+                raise InputError(f"the {name} of a window must be a positive number of seconds, not {seconds:g}")
 
     def steps(self, dt_s: float) -> tuple[int, int, int]:
         """(history, future, stride) in frames; history counts the frame t0 itself."""

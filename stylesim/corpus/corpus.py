@@ -57,7 +57,9 @@ def _manifest(path: Path) -> tuple[dict[str, Any], str]:
     file = path / "corpus.json"
     try:
         raw = file.read_bytes()
-    except (FileNotFoundError, NotADirectoryError):
+    except (OSError, ValueError) as error:
+        if not isinstance(error, FileNotFoundError | NotADirectoryError):
+            raise CorpusError(f"cannot read {file}: {error}") from None
         unfinished = path.with_name(path.name + ".partial")
         hint = f"; {unfinished} is unfinished: repeat its command with --resume" if unfinished.is_dir() else ""
         raise CorpusError(f"{path} is no corpus: it has no corpus.json{hint}") from None
@@ -72,6 +74,9 @@ def _manifest(path: Path) -> tuple[dict[str, Any], str]:
         raise CorpusError(
             f"{path} has schema version {version}; this stylesim reads up to {SCHEMA_VERSION}: install a newer one"
         )
+    for name, kind_of in (("files", dict), ("counts", dict), ("n_scenes", int), ("n_agents", int), ("n_steps", int)):
+        if not isinstance(manifest.get(name), kind_of):
+            raise CorpusError(f"{file} is damaged: {name!r} is missing, or no {kind_of.__name__}")
     return manifest, hashlib.sha256(raw).hexdigest()
 
 

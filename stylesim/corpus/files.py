@@ -10,7 +10,7 @@ from collections.abc import Mapping
 from pathlib import Path, PurePosixPath
 from typing import Any
 
-from stylesim.errors import CorpusError
+from stylesim.errors import CorpusError, InputError
 
 
 def sha256_of(path: Path) -> str:
@@ -42,10 +42,23 @@ def storage_error(error: OSError, path: Path) -> CorpusError:
     """What to tell a user whose disk refused a write."""
     if error.errno in (errno.ENOSPC, errno.EDQUOT):
         return CorpusError(
-            f"the disk is full: could not write {path}. Free some space and run the same command with --resume; "
-            "what was finished is kept."
+            f"the disk is full: could not write {path}. Free some space and repeat the command "
+            "(a verb that has --resume goes on with it from what was finished)."
         )
     return CorpusError(f"could not write {path}: {error.strerror or error}")
+
+
+def new_folder(out: str | Path) -> tuple[Path, Path]:
+    """`out` and the name of the folder that it is built in, OUT.partial.
+
+    InputError if something has the name `out` already, or it is no name at all (empty, "." or "/").
+    """
+    path = Path(out)
+    if not path.name:
+        raise InputError(f"--out {str(out)!r} is no name for a new folder; give one such as runs/first")
+    if path.exists() or path.is_symlink():
+        raise InputError(f"{path} is there already; choose another --out, or remove it first")
+    return path, path.with_name(path.name + ".partial")
 
 
 def json_bytes(value: Mapping[str, Any]) -> bytes:

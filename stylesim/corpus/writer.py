@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any
 import polars as pl
 
 from stylesim.corpus.codec import HEADING_RAD, POSITION_M, VELOCITY_MPS
-from stylesim.corpus.files import json_bytes, sha256_of, storage_error, write_whole
+from stylesim.corpus.files import json_bytes, new_folder, sha256_of, storage_error, write_whole
 from stylesim.corpus.roads import write_road
 from stylesim.corpus.tables import DRIVER_PARAMETERS, SCALES, agents_table, parquet_bytes, signals_table, tracks_table
 from stylesim.errors import CorpusError, InputError
@@ -68,7 +68,7 @@ def write_part(partial: Path, part: int, scenes: Sequence[Scene], splits: Sequen
 class CorpusWriter:
     """Builds `out.partial` and gives it the name `out` when finished; a context manager.
 
-    After an error or a kill the partial folder stays, and the same request with `resume=True` goes on from it.
+    After an error or a kill the finished parts stay, and the same request with `resume=True` goes on from them.
     InputError if `out` exists, or a partial folder is there without `resume`, or from another request.
     """
 
@@ -82,15 +82,12 @@ class CorpusWriter:
         resume: bool = False,
         part_scenes: int = 32,
     ) -> None:
-        self.out = Path(out)
-        self.partial = self.out.with_name(self.out.name + ".partial")
+        self.out, self.partial = new_folder(out)
         self._part_scenes = part_scenes
         self._pending: list[tuple[Scene, str]] = []
         self._added = 0
         self._request = {"source": source, "seed": seed, "configuration": dict(configuration)}
         request = json_bytes(self._request)
-        if self.out.exists():
-            raise InputError(f"{self.out} is there already; choose another --out, or remove it first")
         marker = self.partial / "request.json"
         if self.partial.exists():
             if not resume:
@@ -107,7 +104,16 @@ class CorpusWriter:
     def __exit__(
         self, kind: type[BaseException] | None, value: BaseException | None, trace: TracebackType | None
     ) -> None:
-        """Leave the partial folder as it is: finished parts are worth keeping."""
+        """After an error, keep what is worth keeping (see `leave`)."""
+        if kind is not None:
+            self.leave()
+
+    def leave(self) -> bool:
+        """Give up for now: True if finished parts are kept for `resume`; without one, nothing is left on the disk."""
+        kept = bool(self.done_parts())
+        if not kept and not self.out.exists():
+            shutil.rmtree(self.partial, ignore_errors=True)
+        return kept
 
     def done_parts(self) -> set[int]:
         """Numbers of the parts that are whole."""

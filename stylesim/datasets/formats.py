@@ -24,6 +24,7 @@ class DatasetFormat:
     licence: str
     where: str
     options: tuple[str, ...] = ()
+    numbers: tuple[str, ...] = ()  # those of the options that are positive numbers
 
     def scenes(self) -> Callable[..., Iterator[Scene]]:
         """The reader's `scenes` function; its module is imported now."""
@@ -43,6 +44,7 @@ FORMATS: dict[str, DatasetFormat] = {
             licence="CC BY 4.0",
             where="https://doi.org/10.5281/zenodo.15754836",
             options=("scene_s", "road"),
+            numbers=("scene_s",),
         ),
         DatasetFormat(
             name="av2",

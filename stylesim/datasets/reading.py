@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -34,7 +35,7 @@ def read(
     from stylesim.corpus import CorpusWriter
 
     chosen = dataset_format(format)
-    _check_options(chosen, options)
+    options = _checked_options(chosen, options)
     source = Path(path)
     if not source.exists():
         raise InputError(f"{source} does not exist; {format} is to be had from {chosen.where}")
@@ -54,9 +55,21 @@ def read(
         return writer.finish(run={"path": str(source)})
 
 
-def _check_options(chosen: DatasetFormat, options: dict[str, Any]) -> None:
+def _checked_options(chosen: DatasetFormat, options: dict[str, Any]) -> dict[str, Any]:
+    """The options, numbers as numbers (a command line gives strings); InputError for what the format does not know."""
     for name in options:
         if not chosen.options:
             raise InputError(f"the format {chosen.name} has no options; {name!r} was given")
         if name not in chosen.options:
             raise unknown("option", name, chosen.options, where=f"the format {chosen.name}")
+    return {name: _positive(name, value) if name in chosen.numbers else value for name, value in options.items()}
+
+
+def _positive(name: str, value: Any) -> float:
+    try:
+        number = float(value)
+    except (TypeError, ValueError):
+        number = math.nan
+    if not (math.isfinite(number) and number > 0):
+        raise InputError(f"option {name}: expected a positive number, found {value!r}")
+    return number

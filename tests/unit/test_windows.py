@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from stylesim.errors import InputError
 from stylesim.tracks import AgentKind
 from stylesim.windows import WindowSpec, anchor_frames, target_agents
 from tests.conftest import make_scene
@@ -29,5 +30,5 @@ def test_targets_are_motor_vehicles_known_for_a_second_and_to_the_end():
 
 
 def test_lengths_must_be_positive():
-    with pytest.raises(ValueError, match="must be positive"):
+    with pytest.raises(InputError, match="must be a positive number"):
         WindowSpec(history_s=0)
