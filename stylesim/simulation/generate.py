@@ -13,8 +13,8 @@ from pathlib import Path
 from typing import Any
 
 from stylesim.corpus import Corpus, CorpusWriter
-from stylesim.corpus.files import sha256_of, storage_error
-from stylesim.errors import InputError
+from stylesim.corpus.files import new_folder, sha256_of, storage_error
+from stylesim.errors import InputError, SimulationError
 from stylesim.population import Population
 from stylesim.resources import agents_dir
 from stylesim.scenario import Scenario, load_scenario
@@ -23,6 +23,7 @@ from stylesim.simulation.workers import Job, Task
 
 SIMULATORS = {"sumo": "libsumo", "highway": "highway-env"}  # backend: distribution whose version is recorded
 SOURCE = "simulation"
+KEPT = "Finished episodes are kept; the same command with --resume goes on from there."
 
 
 def generate(
@@ -51,23 +52,29 @@ def generate(
     if Path(out).exists():
         return _finished(Path(out), request, resume=resume)
     started = time.monotonic()
+    writer: CorpusWriter | None = None
     try:
         with Pool(job, workers=workers) as pool:
             writer = CorpusWriter(out, **request, resume=resume)
-            kept = writer.done_parts()
-            _simulate(pool, job, episodes=episodes, kept=kept, progress=progress)
+            before = writer.done_parts()
+            _simulate(pool, job, episodes=episodes, kept=before, progress=progress)
         _sweep(writer.partial)
         run = {
             "seconds": round(time.monotonic() - started, 3),
             "workers": workers,
-            "resumed_episodes": len(kept),
+            "resumed_episodes": len(before),
             "workers_that_died": pool.restarts,
             "machine": platform.platform(),
             "python": platform.python_version(),
         }
         return writer.finish(run=run)
-    except OSError as error:
-        raise storage_error(error, Path(error.filename or out)) from error
+    except BaseException as error:
+        kept = writer is not None and writer.leave()
+        if isinstance(error, OSError):
+            raise storage_error(error, Path(error.filename or out)) from error
+        if kept and isinstance(error, SimulationError):
+            error.args = (f"{error}\n{KEPT}",)
+        raise
 
 
 def realised_styles(corpus: Corpus) -> dict[str, dict[str, int]]:
@@ -125,7 +132,7 @@ def _checked(
         if n > 1:
             raise InputError(f"scenario {name!r} was named {n} times; name it once and raise --episodes instead")
     crowd = Population.load(population) if isinstance(population, str) else population
-    partial = out.with_name(out.name + ".partial").absolute()
+    partial = out.absolute().with_name(out.name + ".partial") if out.name else new_folder(out)[1]
     return Job(loaded, crowd, seed, partial)
 
 

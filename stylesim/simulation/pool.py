@@ -21,7 +21,6 @@ ATTEMPTS = 2
 PATIENCE_S = 5.0  # how long a worker may take to close its simulation
 POLL_S = 0.5  # a wait without end could not be interrupted by Ctrl-C everywhere
 ENVIRONMENT = {"POLARS_MAX_THREADS": "1", "OMP_NUM_THREADS": "1", "NUMBA_NUM_THREADS": "1", "PYTHONHASHSEED": "0"}
-KEPT = "Finished episodes are kept; the same command with --resume goes on from there."
 
 
 class WorkerDiedError(Exception):
@@ -35,7 +34,7 @@ def raised(answer: dict[str, str], place: str) -> StylesimError:
         error = kind(answer["text"])
     else:
         name = "" if kind is SimulationError else f"{answer['error']}: "
-        error = SimulationError(f"{place}: {name}{answer['text']}\n{KEPT}")
+        error = SimulationError(f"{place}: {name}{answer['text']}")
     error.add_note(answer["trace"])
     return error
 
@@ -195,7 +194,7 @@ class Pool:
                 self.restarts += 1
                 if self._stopping.is_set():
                     break
-        raise SimulationError(f"{place}: the worker process died {len(deaths)} times ({deaths[-1]})\n{KEPT}")
+        raise SimulationError(f"{place}: the worker process died {len(deaths)} times ({deaths[-1]})")
 
     def _hand_over(self) -> Worker | None:
         with self._lock:
