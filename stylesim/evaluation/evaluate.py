@@ -14,7 +14,7 @@ from stylesim.evaluation.intervals import DRAWS, LEVEL, MIN_DRIVERS, MIN_UNITS
 from stylesim.evaluation.metrics import MISS_THRESHOLD_M, MODES
 from stylesim.evaluation.results import Evaluation
 from stylesim.evaluation.slices import all_slices, driver_table
-from stylesim.evaluation.strata import with_strata
+from stylesim.evaluation.strata import check_strata, with_strata
 from stylesim.forecast import Forecaster
 from stylesim.windows import WindowSpec
 
@@ -60,6 +60,7 @@ def evaluate(
     view = corpus if split is None else corpus.split(split)
     if batch < 1:
         raise InputError(f"batch must be 1 or more, not {batch}")
+    check_strata(view, tuple(by))
     windows, counts = ask(forecaster, view, spec=spec, modes=modes, batch=batch, progress=progress)
     if windows.is_empty():
         reasons = ", ".join(f"{name}: {count}" for name, count in counts.items() if count)

@@ -10,6 +10,7 @@ from stylesim.labels import UNDETERMINED, StyleLabels
 
 PLAIN = ("scenario", "source", "kind", "commanded")
 METHODS = ("tdbm", "kdsc")  # whose columns the driver table has whenever the corpus has their labels
+KNOWN = (*PLAIN, *METHODS, "tdbm:transposed", *(f"history:{m}" for m in METHODS))
 DRIVER = ("unit_id", "agent_id")  # a source's track id is one person within one recording
 
 
@@ -117,6 +118,21 @@ def with_strata(windows: pl.DataFrame, corpus: Corpus, by: tuple[str, ...]) -> t
     return windows, provenance
 
 
+def check_strata(corpus: Corpus, by: tuple[str, ...]) -> None:
+    """InputError for an unknown stratum, or one whose labels the corpus lacks: before any forecast is made."""
+    for item in by:
+        for stratum in parts_of(item):
+            if stratum in PLAIN:
+                continue
+            method, span, transposed = _method_and_span(stratum)
+            if (method not in METHODS or (transposed and method != "tdbm")) and not corpus.has_labels(method, span):
+                raise unknown("stratum", stratum, KNOWN, where="by")
+            if not corpus.has_labels(method, span):
+                raise InputError(
+                    f"{corpus.path} has no {method} labels; run `stylesim label {corpus.path} --method {method}`"
+                )
+
+
 def _method_and_span(stratum: str) -> tuple[str, str, bool]:
     first, _, second = stratum.partition(":")
     if first == "history" and second:
@@ -125,5 +141,4 @@ def _method_and_span(stratum: str) -> tuple[str, str, bool]:
         return first, "track", False
     if second == "transposed":
         return first, "track", True
-    known = (*PLAIN, *METHODS, "tdbm:transposed", *(f"history:{m}" for m in METHODS))
-    raise unknown("stratum", stratum, known, where="by")
+    raise unknown("stratum", stratum, KNOWN, where="by")
