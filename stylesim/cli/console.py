@@ -3,12 +3,20 @@
 from __future__ import annotations
 
 import sys
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager
 
 from rich.console import Console
 from rich.markup import escape
-from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn, TimeRemainingColumn
+from rich.progress import (
+    BarColumn,
+    MofNCompleteColumn,
+    Progress,
+    TaskID,
+    TextColumn,
+    TimeElapsedColumn,
+    TimeRemainingColumn,
+)
 from rich.table import Table
 
 FILE_WIDTH = 140  # columns where the output is no terminal; chosen: the widest table, errors by style, fits
@@ -39,21 +47,40 @@ def show_table(title: str, columns: Sequence[str], rows: Iterable[Sequence[objec
     _out.print(table)
 
 
+class Bar:
+    """One progress bar; calling it is the `progress(done, total)` callback of the library."""
+
+    def __init__(self, progress: Progress, title: str, unit: str) -> None:
+        self._progress = progress
+        self._title, self._unit = title, unit
+        self._task: TaskID | None = None
+
+    def __call__(self, done: int, total: int) -> None:
+        """So many are done; a `total` of 0 means that it is not known."""
+        if self._task is None:
+            self._progress.start()  # only now: an error before the first step should stand alone on stderr
+            self._task = self._progress.add_task(self._title, total=None, unit=self._unit)
+        self._progress.update(self._task, completed=done, total=total or None)
+
+    def stage(self, title: str, unit: str = "") -> None:
+        """What is counted from here on gets a bar of its own."""
+        self._title, self._unit, self._task = title, unit, None
+
+
 @contextmanager
-def progress_bar(title: str, unit: str = "") -> Iterator[Callable[[int, int], None]]:
-    """A bar on stderr for the `progress(done, total)` callbacks of the library."""
+def progress_bar(title: str, unit: str = "") -> Iterator[Bar]:
+    """A bar on stderr from the first step on."""
     columns = (
         TextColumn("{task.description}"),
         BarColumn(),
         MofNCompleteColumn(),
-        TextColumn(unit),
+        TextColumn("{task.fields[unit]}"),
         TimeElapsedColumn(),
         TimeRemainingColumn(),
     )
-    with Progress(*columns, console=_err) as bar:
-        task = bar.add_task(title, total=None)
-
-        def update(done: int, total: int) -> None:
-            bar.update(task, completed=done, total=total or None)  # 0: the total is not known
-
-        yield update
+    progress = Progress(*columns, console=_err)
+    try:
+        yield Bar(progress, title, unit)
+    finally:
+        if progress.tasks:
+            progress.stop()

@@ -27,7 +27,9 @@ def read(
     format: str = typer.Argument(help="Format of the recording (see `stylesim list datasets`)."),
     path: Path = typer.Argument(help="File or folder of the recording."),
     out: Path = typer.Option(..., "--out", help="Folder of the new corpus; must not exist."),
-    option: list[str] = typer.Option([], "--option", "-o", help="The reader's own options, KEY=VALUE; repeatable."),
+    option: list[str] = typer.Option(
+        [], "--option", "-o", help="The reader's own options, KEY=VALUE, repeatable (see `stylesim describe FORMAT`)."
+    ),
     resume: bool = typer.Option(False, help="Go on from an unfinished run of the same request."),
 ) -> None:
     """Read a recorded data set into a new corpus; what was dropped is counted and said."""
@@ -40,7 +42,7 @@ def read(
 
 
 def merge(
-    corpus: list[Path] = typer.Argument(help="Corpora to merge."),
+    corpus: list[Path] = typer.Argument(help="Corpora to merge (folders)."),
     out: Path = typer.Option(..., "--out", help="Folder of the new corpus; must not exist."),
     balance: str = typer.Option("none", help="Sampling weights of the training split: none, tdbm or source."),
     split: str = typer.Option("0.8,0.1,0.1", help="Shares of train, val, test; by recording or episode."),
@@ -50,6 +52,7 @@ def merge(
 ) -> None:
     """Merge corpora: one clock, one frame, split by recording, styles balanced by weights."""
     from stylesim.corpus import Corpus
+    from stylesim.corpus.files import new_folder
     from stylesim.merging.merge import merge as run
 
     try:
@@ -58,6 +61,7 @@ def merge(
         raise InputError(f"--split: expected three numbers like 0.8,0.1,0.1, found {split!r}") from None
     if len(parts) != 3:
         raise InputError(f"--split: expected three numbers like 0.8,0.1,0.1, found {split!r}")
+    new_folder(out)  # before anything long
     with progress_bar("merging", "scenes") as progress:
         merged = run(
             [Corpus(path) for path in corpus],
@@ -92,7 +96,10 @@ def balance(
 
 
 def verify(path: Path = typer.Argument(help="A corpus.")) -> None:
-    """Check a corpus: checksums, schema, physics. Exits with 1 and what it found if something is wrong."""
+    """Check a corpus: checksums, schema, physics.
+
+    Exits with 1 and what it found if something is wrong, with 3 if it is no corpus at all.
+    """
     from stylesim.corpus.verify import verify as run
 
     with progress_bar("verifying", "scenes") as progress:
@@ -110,7 +117,7 @@ def verify(path: Path = typer.Argument(help="A corpus.")) -> None:
 
 def add_to(app: typer.Typer) -> None:
     """Register the verbs."""
-    app.command("read")(read)
-    app.command("merge")(merge)
-    app.command("balance")(balance)
-    app.command("verify")(verify)
+    app.command("read", epilog="Example: `stylesim read dlr_ut data/dlr_ut --out runs/real`")(read)
+    app.command("merge", epilog="Example: `stylesim merge runs/sim runs/real --balance tdbm --out runs/mixed`")(merge)
+    app.command("balance", epilog="Example: `stylesim balance runs/mixed --by tdbm`")(balance)
+    app.command("verify", epilog="Example: `stylesim verify runs/sim`")(verify)

@@ -99,5 +99,5 @@ def describe(name: str = typer.Argument(help="A scenario, population, style or d
 
 def add_to(app: typer.Typer) -> None:
     """Register the verbs."""
-    app.command("list")(list_)
-    app.command("describe")(describe)
+    app.command("list", epilog="Example: `stylesim list scenarios`")(list_)
+    app.command("describe", epilog="Example: `stylesim describe yellow_light`")(describe)

@@ -2,17 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import shutil
+from collections.abc import Callable, Sequence
 from enum import StrEnum
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 import typer
 
-from stylesim.cli.console import progress_bar, say, show_table
+from stylesim.cli.console import Bar, progress_bar, say, show_table
 from stylesim.errors import InputError
 
 if TYPE_CHECKING:
+    from stylesim.report.evaluate import Report
     from stylesim.report.tables import Cell
 
 
@@ -46,7 +48,9 @@ def train(
     corpus: Path = typer.Argument(help="A merged corpus (with splits)."),
     out: Path = typer.Option(..., "--out", help="Folder of the new model; must not exist."),
     condition: Condition = typer.Option(Condition.none, help="Condition on the style of the history."),
-    fusion: Fusion = typer.Option(Fusion.early, help="Where the style enters."),
+    fusion: Fusion = typer.Option(
+        Fusion.early, help="Where the style enters the network (without --condition it does not)."
+    ),
     size: str = typer.Option("tiny", help="tiny, small or base."),
     reading: Reading = typer.Option(Reading.R1, help="How style, cluster and context make one embedding."),
     epochs: int = typer.Option(20, min=1, help="At most this many epochs; stops early without progress."),
@@ -65,9 +69,10 @@ def train(
     from stylesim.forecasting.training import train as run
     from stylesim.windows import WindowSpec
 
-    with progress_bar(f"training {out.name}", "steps") as progress:
+    opened = Corpus(corpus)
+    with progress_bar("training", "steps") as bar:
         model = run(
-            Corpus(corpus),
+            opened,
             condition=condition.value,
             fusion=fusion.value,
             size=size,
@@ -81,7 +86,8 @@ def train(
             seed=seed,
             out=out,
             resume=resume,
-            progress=progress,
+            progress=bar,
+            stage=lambda what: bar.stage(what, "steps" if what == "training" else "scenes"),
         )
     rows = [
         (r["epoch"], f"{r['train_loss']:.3f}", f"{r['val_loss']:.3f}", f"{r['min_fde_m']:.2f}")
@@ -92,37 +98,68 @@ def train(
 
 
 def evaluate(
-    forecaster: list[str] = typer.Argument(help="Model folders or baselines (constant_velocity, …), then the corpus."),
-    by: str = typer.Option("tdbm", help="Strata: tdbm, kdsc, scenario, source, commanded, …; comma-separated."),
-    split: str = typer.Option("test", help="Split to evaluate; 'all' for the whole corpus."),
+    forecaster: list[str] = typer.Argument(
+        help="Model folders or baselines (constant_velocity, constant_turn_rate), and last the corpus."
+    ),
+    by: str = typer.Option(
+        "tdbm",
+        help="Strata, comma-separated: tdbm, kdsc, history:tdbm, history:kdsc, tdbm:transposed, "
+        "scenario, source, kind, commanded; crossed with *: tdbm*scenario.",
+    ),
+    split: str = typer.Option("test", help="Split to evaluate: train, val, test, or all for the whole corpus."),
     seed: int = typer.Option(0, min=0, help="Of the bootstrap."),
     out: Path = typer.Option(..., "--out", help="Folder of the report; must not exist."),
 ) -> None:
     """Evaluate forecasters by style: tables with n and 95 % intervals, JSON, Markdown, Parquet and an HTML report."""
     from stylesim.corpus import Corpus
+    from stylesim.corpus.files import new_folder
     from stylesim.forecasting.opening import open_forecaster
     from stylesim.report.evaluate import evaluate as run
     from stylesim.report.tables import error_table
 
     if len(forecaster) < 2:
         raise InputError("give at least one forecaster and, last, the corpus")
-    if out.exists():
-        raise InputError(f"{out} is there already; choose another --out, or remove it first")
+    final, partial = new_folder(out)
+    if any((partial / name).exists() for name in ("request.json", "training.json")):
+        raise InputError(f"{partial} is left from an unfinished run of another verb; finish it, or remove it")
     *names, corpus_path = forecaster
     corpus = Corpus(corpus_path)
     view = corpus if split == "all" else corpus.split(split)
     models = [open_forecaster(name) for name in names]
     strata = tuple(part.strip() for part in by.split(",") if part.strip())
-    with progress_bar("evaluating", "windows") as progress:
-        report = run(models, view, by=strata, seed=seed, progress=lambda _name, done, total: progress(done, total))
-    partial = out.with_name(out.name + ".partial")
-    partial.mkdir(parents=True, exist_ok=True)
-    report.save(partial / "report.html")
-    partial.rename(out)
+    if not strata:
+        raise InputError("--by: name at least one stratum, such as tdbm or scenario")
+    with progress_bar("evaluating", "scenes") as bar:
+        report = run(models, view, by=strata, seed=seed, progress=_by_forecaster(bar))
+    _save(report, partial, final)
     for stratum in strata:
         table = error_table(report.evaluations, stratum)
         show_table(table.caption, table.headings, [_texts(row, len(table.headings)) for row in table.rows])
     say(f"{out / 'report.html'}")
+
+
+def _by_forecaster(bar: Bar) -> Callable[[str, int, int], None]:
+    """A callback that gives each forecaster a line of its own."""
+    shown = ""
+
+    def update(name: str, done: int, total: int) -> None:
+        nonlocal shown
+        if name != shown:
+            shown = name
+            bar.stage(f"evaluating {name}", "scenes")
+        bar(done, total)
+
+    return update
+
+
+def _save(report: Report, partial: Path, final: Path) -> None:
+    """The report under its final name, or nothing at all."""
+    shutil.rmtree(partial, ignore_errors=True)  # of a run that was killed
+    try:
+        report.save(partial / "report.html")
+        partial.rename(final)
+    finally:
+        shutil.rmtree(partial, ignore_errors=True)
 
 
 def _texts(row: Sequence[Cell], width: int) -> list[str]:
@@ -148,6 +185,11 @@ def render(
 
 def add_to(app: typer.Typer) -> None:
     """Register the verbs."""
-    app.command("train")(train)
-    app.command("evaluate")(evaluate)
-    app.command("render")(render)
+    app.command("train", epilog="Example: `stylesim train runs/mixed --condition tdbm --epochs 10 --out runs/model`")(
+        train
+    )
+    app.command(
+        "evaluate",
+        epilog="Example: `stylesim evaluate constant_velocity runs/model runs/mixed --by tdbm --out runs/report`",
+    )(evaluate)
+    app.command("render", epilog="Example: `stylesim render runs/sim --out runs/scene.png`")(render)

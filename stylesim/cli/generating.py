@@ -37,14 +37,16 @@ def chosen_population(population: str | None, styles: str | None, reweight: str 
         if population is not None or reweight is not None:
             raise InputError("--styles gives every share; it cannot go with --population or --reweight")
         return Population.of(**shares(styles, "--styles"))
-    base = Population.load(population or "tdbm_spectrum")
+    base = Population.load("tdbm_spectrum" if population is None else population)
     return base.reweighted(**shares(reweight, "--reweight")) if reweight is not None else base
 
 
 def generate(
     scenario: list[str] = typer.Argument(help="Scenarios by name (see `stylesim list scenarios`) or by folder."),
     out: Path = typer.Option(..., "--out", help="Folder of the new corpus; must not exist."),
-    population: str | None = typer.Option(None, help="A population's name or YAML file.", show_default="tdbm_spectrum"),
+    population: str | None = typer.Option(
+        None, help="A population's name (see `stylesim list populations`) or YAML file.", show_default="tdbm_spectrum"
+    ),
     styles: str | None = typer.Option(None, help="All shares, sum 1: aggressive=0.3,careful=0.7."),
     reweight: str | None = typer.Option(None, help="Set some shares, scale the rest: aggressive=0.3."),
     episodes: int = typer.Option(10, min=1, help="Episodes per scenario."),
@@ -75,4 +77,7 @@ def generate(
 
 def add_to(app: typer.Typer) -> None:
     """Register the verb."""
-    app.command("generate")(generate)
+    app.command(
+        "generate",
+        epilog="Example: `stylesim generate yellow_light highway --episodes 9 --reweight timid=0.3 --out runs/sim`",
+    )(generate)

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 import typer
 
 from stylesim.cli.console import progress_bar, say, show_table
+from stylesim.errors import InputError
 from stylesim.labels import StyleLabels
 from stylesim.windows import WindowSpec
 
@@ -22,6 +23,13 @@ class Method(StrEnum):
 
     tdbm = "tdbm"
     kdsc = "kdsc"
+
+
+class Span(StrEnum):
+    """What a label is of."""
+
+    track = "track"
+    history = "history"
 
 
 def _shares(labels: StyleLabels) -> list[tuple[str, int, str]]:
@@ -43,7 +51,9 @@ def label(
     fit: Path | None = typer.Option(
         None, help="Corpus to fit scaler or clusters on; without it the shipped reference (never the judged corpus)."
     ),
-    window: float = typer.Option(WindowSpec().history_s, help="History in seconds of the window labels."),
+    window: float = typer.Option(
+        WindowSpec().history_s, help="History in seconds of the window labels; with the shipped reference 1.1, 2 or 5."
+    ),
     future: float = typer.Option(WindowSpec().future_s, help="Future in seconds that a forecaster will be asked for."),
     stride: float = typer.Option(WindowSpec().stride_s, help="Seconds from one t0 to the next."),
 ) -> None:
@@ -51,16 +61,24 @@ def label(
     from stylesim.corpus import Corpus
     from stylesim.labelers.labelling import label as run
     from stylesim.labelers.reference import default_labeler, new_labeler
+    from stylesim.labelers.spans import SAME_LENGTH_S
     from stylesim.labelers.tdbm import TDBM
 
     spec = WindowSpec(window, future, stride)
+    opened = Corpus(corpus)
     if fit is None:
         labeler = default_labeler(method.value)
+        if not any(abs(window - known) <= SAME_LENGTH_S for known in labeler.history_s):
+            known = ", ".join(f"{length:g}" for length in labeler.history_s)
+            raise InputError(
+                f"--window {window:g}: the shipped reference judges histories of {known} s; for another length fit "
+                f"on a corpus of your own: --fit CORPUS --window {window:g}"
+            )
     else:
         with progress_bar(f"fitting {method.value} on {fit.name}", "scenes") as progress:
             labeler = new_labeler(method.value, history_s=(window,)).fit(Corpus(fit), progress=progress)
     with progress_bar(f"labelling {corpus.name} by {method.value}", "scenes") as progress:
-        labels = run(Corpus(corpus), labeler, spec=spec, progress=progress)
+        labels = run(opened, labeler, spec=spec, progress=progress)
     show_table(f"{method.value}: {len(labels)} tracks", ("style", "tracks", "share"), _shares(labels))
     if isinstance(labeler, TDBM):  # KDSC clamps nothing
         shares = _clamped(labeler.track_scaler_, labels)
@@ -72,16 +90,17 @@ def labels(
     corpus: Path = typer.Argument(help="A labelled corpus."),
     join: Path = typer.Option(..., help="CSV to write: one row per label, with the source's own ids."),
     method: Method = typer.Option(Method.tdbm, help="Which labels."),
-    span: str = typer.Option("track", help="track (whole tracks) or history (windows that end at t0)."),
+    span: Span = typer.Option(Span.track, help="track (whole tracks) or history (windows that end at t0)."),
 ) -> None:
     """Write labels as a CSV that joins to your own data by source_scenario_id and source_track_id."""
+    from stylesim.corpus import Corpus
     from stylesim.corpus.label_store import export_csv
 
-    rows = export_csv(corpus, method.value, span, join)
+    rows = export_csv(Corpus(corpus).path, method.value, span.value, join)
     say(f"{rows} rows: {join}")
 
 
 def add_to(app: typer.Typer) -> None:
     """Register the verbs."""
-    app.command("label")(label)
-    app.command("labels")(labels)
+    app.command("label", epilog="Example: `stylesim label runs/sim --method tdbm --fit runs/real`")(label)
+    app.command("labels", epilog="Example: `stylesim labels runs/sim --join labels.csv`")(labels)

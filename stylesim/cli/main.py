@@ -5,17 +5,42 @@ from __future__ import annotations
 import os
 import sys
 import traceback
+from typing import Any
 
 import typer
+from typer.core import TyperGroup
 
-from stylesim.version import __version__
+from stylesim import __version__
 from stylesim.cli import corpora, describing, forecasting, generating, labelling
 from stylesim.cli.console import err
 from stylesim.errors import StylesimError
 
+INTERRUPTED = 130  # 128 + SIGINT, as shells count
+
+
+class Verbs(TyperGroup):
+    """The verbs; an interrupt says what to do next (typer alone would end without a word)."""
+
+    def invoke(self, ctx: Any) -> Any:
+        """Run the verb."""
+        try:
+            return super().invoke(ctx)
+        except KeyboardInterrupt:
+            verb = self.commands.get(ctx.invoked_subcommand or "")
+            resumes = verb is not None and any(parameter.name == "resume" for parameter in verb.params)
+            again = "with --resume to go on from what was finished" if resumes else "to start anew"
+            err(f"interrupted; nothing half-written is left under a final name. Repeat the command {again}.")
+            raise SystemExit(INTERRUPTED) from None
+
+
 app = typer.Typer(
     name="stylesim",
+    cls=Verbs,
     help="Traffic with drivers of every style: generate, read, label, merge, train, evaluate.",
+    epilog=(
+        "First steps: `stylesim list scenarios`, `stylesim generate yellow_light --episodes 4 --out runs/sim`, "
+        "`stylesim label runs/sim`."
+    ),
     no_args_is_help=True,
     add_completion=True,
     pretty_exceptions_enable=False,
@@ -25,10 +50,11 @@ for module in (generating, corpora, labelling, forecasting, describing):
     module.add_to(app)
 
 
-def _version(shown: bool) -> None:
+def _version(shown: bool) -> bool:
     if shown:
         sys.stdout.write(f"stylesim {__version__}\n")
         raise typer.Exit
+    return shown
 
 
 @app.callback()
@@ -48,12 +74,18 @@ def main(argv: list[str] | None = None) -> None:
     except StylesimError as error:
         _report(error, f"error: {error}")
         raise SystemExit(error.exit_code) from None
-    except KeyboardInterrupt:
-        err("interrupted; nothing half-written is left. Repeat the command with --resume to go on from here.")
-        raise SystemExit(130) from None
+    except KeyboardInterrupt:  # before the verb began
+        raise SystemExit(INTERRUPTED) from None
+    except OSError as error:
+        place = f"{error.filename}: " if error.filename else ""
+        _report(error, f"error: {place}{error.strerror or error}")
+        raise SystemExit(os.EX_IOERR) from None
+    except MemoryError as error:
+        _report(error, "error: out of memory; use fewer workers, smaller scenes, or a larger machine")
+        raise SystemExit(os.EX_OSERR) from None
     except Exception as error:  # noqa: BLE001 - the last resort: a message, and the traceback on request
         _report(error, f"internal error: {type(error).__name__}: {error}\nRun `stylesim --debug …` for the traceback.")
-        raise SystemExit(70) from None
+        raise SystemExit(os.EX_SOFTWARE) from None
 
 
 def _report(error: BaseException, text: str) -> None:
