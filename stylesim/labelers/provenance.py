@@ -48,4 +48,5 @@ class Witness:
             "units": len(self._units),
             "scenes": self._count,
             "corpus_fingerprint": str(getattr(self._scenes, "fingerprint", "")),
+            "corpus_seed": getattr(self._scenes, "manifest", {}).get("seed"),  # a judged corpus must have another
         }
