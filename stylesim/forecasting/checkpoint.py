@@ -5,6 +5,7 @@ from __future__ import annotations
 import io
 import json
 import pickle
+import warnings
 import zipfile
 from collections.abc import Mapping
 from pathlib import Path
@@ -13,6 +14,7 @@ from typing import Any
 import torch
 from torch import Tensor
 
+from stylesim.corpus.files import write_whole
 from stylesim.errors import InputError
 from stylesim.forecasting.conditioner import StyleConditioner
 from stylesim.forecasting.conditioning import StyleCells
@@ -30,22 +32,23 @@ def _first_line(error: Exception) -> str:
 
 
 def write_tensors(path: Path, content: Mapping[str, Any]) -> None:
-    """A file of tensors, numbers and strings that appears under its name only when whole."""
+    """A file of tensors, numbers and strings, whole or not at all; CorpusError for a full disk."""
     buffer = io.BytesIO()
     torch.save(dict(content), buffer)
-    partial = path.with_name(path.name + ".partial")
-    partial.write_bytes(buffer.getbuffer())
-    partial.replace(path)
+    write_whole(path, buffer.getvalue())
 
 
 def read_tensors(path: Path, *, format_name: str, version: int) -> dict[str, Any]:
     """The content of such a file; InputError if it is missing, damaged, not ours, or newer."""
     refused = f"{path} is not a checkpoint of stylesim"
     try:
-        content = torch.load(path, map_location="cpu", weights_only=True)
+        with warnings.catch_warnings(action="ignore", category=UserWarning):  # of foreign pickles: refused below
+            content = torch.load(path, map_location="cpu", weights_only=True)
     except FileNotFoundError:
         raise InputError(f"no such file: {path}; train a model with `stylesim train`") from None
-    except (pickle.UnpicklingError, RuntimeError, EOFError, zipfile.BadZipFile, ValueError, KeyError) as error:
+    except pickle.UnpicklingError:  # torch's text proposes to run what is in the file
+        raise InputError(f"{refused}: it holds something other than tensors; it was not loaded") from None
+    except (OSError, RuntimeError, EOFError, zipfile.BadZipFile, ValueError, KeyError, AttributeError) as error:
         raise InputError(f"{refused}, or it is damaged: {_first_line(error)}") from None
     if not isinstance(content, dict) or content.get("format") != format_name:
         raise InputError(f"{refused}: it has no {format_name!r} mark")
@@ -93,8 +96,9 @@ def _curve(record: Path) -> tuple[Mapping[str, float], ...]:
     if not record.is_file():
         return ()
     try:
-        return tuple(json.loads(record.read_bytes())["curve"])
-    except (KeyError, TypeError, ValueError) as error:
+        curve = json.loads(record.read_bytes())["curve"]
+        return tuple({key: float(value) for key, value in epoch.items()} for epoch in curve)
+    except (KeyError, TypeError, ValueError, AttributeError) as error:
         raise InputError(f"{record} is no record of a training: {error!r}") from error
 
 

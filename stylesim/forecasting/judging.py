@@ -12,7 +12,7 @@ from jaxtyping import Int32
 from stylesim.corpus import Corpus
 from stylesim.errors import InputError, unknown
 from stylesim.forecasting.conditioning import Measured
-from stylesim.labelers.base import Labeler
+from stylesim.labelers.base import Labeler, Progress
 from stylesim.labelers.history import history_labels
 from stylesim.labelers.kdsc import KDSC
 from stylesim.labelers.tdbm import TDBM
@@ -36,14 +36,14 @@ class LabelerJudges:
     history_s: float
 
     @classmethod
-    def fit(cls, condition: str, train: Corpus, spec: WindowSpec) -> LabelerJudges:
+    def fit(cls, condition: str, train: Corpus, spec: WindowSpec, *, progress: Progress | None = None) -> LabelerJudges:
         """Labellers fitted on the training split, for histories as long as the model's."""
         if condition not in STYLE_METHODS:
             raise unknown("style method", condition, STYLE_METHODS)
-        kinematic = KDSC(history_s=(spec.history_s,)).fit(train)
+        kinematic = KDSC(history_s=(spec.history_s,)).fit(train, progress=progress)
         if condition == "kdsc":
             return cls(kinematic, kinematic, tuple(kinematic.names), spec.history_s)
-        style = TDBM(history_s=(spec.history_s,)).fit(train)
+        style = TDBM(history_s=(spec.history_s,)).fit(train, progress=progress)
         return cls(style, kinematic, STYLE_CLASSES, spec.history_s)
 
     def measure(self, history: Scene, agent_index: Int32[np.ndarray, " driver"]) -> Measured:

@@ -15,6 +15,7 @@ import numpy as np
 from jaxtyping import Int32, Int64
 
 from stylesim.corpus import Corpus
+from stylesim.corpus.files import storage_error
 from stylesim.forecasting.config import InputConfig
 from stylesim.forecasting.snapshot import RoadArrays, agent_arrays, gave_evidence, lane_signals, road_arrays
 from stylesim.forecasting.store import NO_ROAD, FileSink, SampleStore, StoreBuilder
@@ -110,14 +111,14 @@ def compiled(
     if not folder.is_dir():
         partial = cache / f"{folder.name}.partial-{os.getpid()}"
         shutil.rmtree(partial, ignore_errors=True)
-        partial.mkdir(parents=True)
         try:
+            partial.mkdir(parents=True)
             with FileSink(partial, config) as sink:
                 _compile(corpus, spec, config, StoreBuilder(sink), progress)
             partial.rename(folder)
-        except OSError:
+        except OSError as error:
             if not folder.is_dir():  # else another process finished the same store first
-                raise
+                raise storage_error(error, partial) from error
         finally:
             shutil.rmtree(partial, ignore_errors=True)
     return SampleStore.load(folder)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 import shutil
 from collections.abc import Callable
-from dataclasses import asdict
+from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
@@ -13,6 +13,7 @@ import numpy as np
 import torch
 
 from stylesim.corpus import Corpus
+from stylesim.corpus.files import new_folder, write_whole
 from stylesim.errors import InputError, unknown
 from stylesim.forecasting.checkpoint import MODEL_FILE, RECORD_FILE, load, save
 from stylesim.forecasting.conditioner import Judges, StyleConditioner, fit_conditioner
@@ -22,7 +23,7 @@ from stylesim.forecasting.devices import runtime
 from stylesim.forecasting.forecaster import TrainedForecaster
 from stylesim.forecasting.loop import STATE_FILE, Loop, TrainSettings
 from stylesim.forecasting.model import ForecastNetwork
-from stylesim.forecasting.samples import SPLITS, compiled, windows
+from stylesim.forecasting.samples import SPLITS, Progress, compiled, windows
 from stylesim.forecasting.store import SampleStore
 from stylesim.randomness import stream
 from stylesim.resources import cache_dir
@@ -50,7 +51,8 @@ def train(
     cache: Path | None = None,
     accelerator: str = "auto",
     resume: bool = False,
-    progress: Callable[[int, int], None] | None = None,
+    progress: Progress | None = None,
+    stage: Callable[[str], None] | None = None,
 ) -> TrainedForecaster:
     """Train on the split "train", stop early on "val", and leave the model in the folder `out`.
 
@@ -60,6 +62,8 @@ def train(
     number of threads); `out` appears under its name only when whole, and `resume` continues OUT.partial with the
     last finished epoch. `out` holds model.pt and training.json (settings, loss curve). InputError for a corpus
     without those splits, unknown names, or an `out` that exists.
+
+    `stage` is called with what begins (compiling, fitting, judging, training); `progress` then counts for it.
     """
     if condition not in CONDITIONS:
         raise unknown("condition", condition, CONDITIONS)
@@ -82,8 +86,9 @@ def train(
         _same(record, out)
         return load(out)
     folder = _opened(out, record, resume=resume)
-    store = compiled(corpus, spec, inputs, cache or cache_dir())
-    conditioner, data = _styled(corpus, condition, spec, store, inputs, judges, seed)
+    watch = _Watch(stage, progress)
+    store = compiled(corpus, spec, inputs, cache or cache_dir(), progress=watch.begin("compiling samples"))
+    conditioner, data = _styled(corpus, condition, spec, store, inputs, judges, seed, watch)
     config = _with_styles(config, conditioner)
     place = runtime(accelerator)
     with torch.random.fork_rng():
@@ -92,7 +97,7 @@ def train(
     network.intention_mps2.copy_(torch.from_numpy(data.intentions(config.queries, seed=seed)))
     loop = Loop(network, data, settings, runtime=place, folder=folder)
     loop.restore()
-    loop.run(progress)
+    loop.run(watch.begin("training"))
     name = size if condition == "none" else f"{size}-{condition}-{fusion}"
     forecaster = TrainedForecaster(name, network, conditioner)
     save(forecaster, folder / MODEL_FILE)
@@ -105,6 +110,20 @@ def train(
     (folder / STATE_FILE).unlink(missing_ok=True)
     folder.rename(out)
     return forecaster
+
+
+@dataclass(frozen=True)
+class _Watch:
+    """Whoever looks on: told what begins, then how far it is."""
+
+    stage: Callable[[str], None] | None
+    progress: Progress | None
+
+    def begin(self, what: str) -> Progress | None:
+        """Say what begins; what counts for it."""
+        if self.stage is not None:
+            self.stage(what)
+        return self.progress
 
 
 def _time_step(corpus: Corpus) -> float:
@@ -125,6 +144,7 @@ def _styled(
     inputs: InputConfig,
     judges: Judges | None,
     seed: int,
+    watch: _Watch,
 ) -> tuple[StyleConditioner | None, TrainingData]:
     """The conditioner fitted on the training split, and the samples with their style."""
     if condition == "none":
@@ -132,8 +152,9 @@ def _styled(
     if judges is None:
         from stylesim.forecasting.judging import LabelerJudges
 
-        judges = LabelerJudges.fit(condition, corpus.split("train"), spec)
-    conditioner, style = fit_conditioner(condition, judges, windows(corpus, spec), seed=seed)
+        judges = LabelerJudges.fit(condition, corpus.split("train"), spec, progress=watch.begin("fitting labellers"))
+    asked = windows(corpus, spec, progress=watch.begin("judging histories"))
+    conditioner, style = fit_conditioner(condition, judges, asked, seed=seed)
     return conditioner, TrainingData(store, style, inputs)
 
 
@@ -146,14 +167,13 @@ def _with_styles(config: ModelConfig, conditioner: StyleConditioner | None) -> M
 
 def _opened(out: Path, record: dict[str, Any], *, resume: bool) -> Path:
     """The folder OUT.partial to train in; InputError if `out` exists or what lies there was begun otherwise."""
-    if out.exists():
-        raise InputError(f"{out} exists already; choose another --out, or remove it")
-    partial = out.with_name(out.name + ".partial")
+    out, partial = new_folder(out)
     if resume and (partial / RECORD_FILE).exists():
         _same(record, partial)
         return partial
+    if any((partial / name).exists() for name in (STATE_FILE, "request.json")):  # epochs, or a corpus's parts
+        raise InputError(f"{partial} is left from an unfinished run; add --resume to go on, or remove it")
     shutil.rmtree(partial, ignore_errors=True)
-    partial.mkdir(parents=True)
     _write_json(partial / RECORD_FILE, record)
     return partial
 
@@ -171,6 +191,4 @@ def _same(record: dict[str, Any], folder: Path) -> None:
 
 
 def _write_json(path: Path, content: dict[str, Any]) -> None:
-    partial = path.with_name(path.name + ".partial")
-    partial.write_text(json.dumps(content, indent=1, sort_keys=True), encoding="utf-8")
-    partial.replace(path)
+    write_whole(path, json.dumps(content, indent=1, sort_keys=True).encode())

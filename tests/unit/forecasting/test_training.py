@@ -9,7 +9,7 @@ import pytest
 import torch
 
 from stylesim.corpus import Corpus
-from stylesim.errors import InputError, StylesimError
+from stylesim.errors import CorpusError, InputError, StylesimError
 from stylesim.forecasting import checkpoint, training
 from stylesim.forecasting.checkpoint import MODEL_FILE, load
 from stylesim.forecasting.forecaster import TrainedForecaster
@@ -91,7 +91,7 @@ def test_the_same_seed_gives_the_same_weights_also_after_an_interruption(
 def test_what_lies_there_is_not_overwritten_or_mixed(
     corpus: Corpus, straight: tuple[TrainedForecaster, Path], cache: Path
 ) -> None:
-    with pytest.raises(InputError, match="exists already"):
+    with pytest.raises(InputError, match="is there already"):
         trained(corpus, straight[1], cache)
     with pytest.raises(InputError, match="trained with settings"):
         trained(corpus, straight[1], cache, lr=0.5, resume=True)
@@ -182,7 +182,7 @@ def test_a_full_disk_leaves_the_old_checkpoint(tmp_path: Path, monkeypatch: pyte
         raise OSError(28, "No space left on device")
 
     monkeypatch.setattr(Path, "write_bytes", full)
-    with pytest.raises(OSError, match="No space"):
+    with pytest.raises(CorpusError, match="disk is full"):
         checkpoint.write_tensors(path, {"format": "x", "version": 1, "a": torch.zeros(2)})
     assert path.read_bytes() == before
 
