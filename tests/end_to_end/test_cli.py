@@ -1,0 +1,53 @@
+"""The whole way by command line: generate, label, merge, train, evaluate, verify, render, join."""
+
+from __future__ import annotations
+
+import csv
+import json
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from stylesim.corpus import Corpus
+
+
+def stylesim(*argv: object) -> str:
+    """stdout of the command; its stderr in the failure if it fails."""
+    program = "from stylesim.cli import main; main()"
+    done = subprocess.run([sys.executable, "-c", program, *map(str, argv)], capture_output=True, text=True, check=False)
+    assert done.returncode == 0, f"{argv}\n{done.stdout}\n{done.stderr}"
+    return done.stdout
+
+
+def the_whole_way(folder: Path, scenario: str, *, condition: str, episodes: int) -> None:
+    sim, mixed, model = folder / "sim", folder / "mixed", folder / "model"
+    stylesim("generate", scenario, "--episodes", episodes, "--seed", 7, "--out", sim)
+    assert "sound" in stylesim("verify", sim)
+    assert "aggressive" in stylesim("label", sim)
+    stylesim("merge", sim, "--split", "0.34,0.33,0.33", "--balance", "tdbm", "--out", mixed)
+    assert {info.split for info in Corpus(mixed).info} == {"train", "val", "test"}
+    stylesim("train", mixed, "--condition", condition, "--epochs", 1, "--max-steps", 3, "--out", model)
+    said = stylesim("evaluate", "constant_velocity", model, mixed, "--by", "tdbm,scenario", "--out", folder / "report")
+    assert "minFDE" in said
+    assert {"report.html", "constant_velocity.json"} <= {path.name for path in (folder / "report").iterdir()}
+    assert json.loads((folder / "report" / "constant_velocity.json").read_text())["slices"]
+    stylesim("render", mixed, "--out", folder / "scene.png")
+    assert (folder / "scene.png").read_bytes().startswith(b"\x89PNG")
+    stylesim("labels", sim, "--join", folder / "labels.csv")
+    rows = list(csv.DictReader((folder / "labels.csv").read_text().splitlines()))
+    assert {row["source_scenario_id"] for row in rows} == {info.source_scenario_id for info in Corpus(sim).info}
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("scenario", ["highway", "yellow_light"])
+def test_the_whole_way(scenario, tmp_path, monkeypatch):
+    monkeypatch.setenv("STYLESIM_CACHE", str(tmp_path / "cache"))
+    the_whole_way(tmp_path, scenario, condition="tdbm", episodes=3)
+
+
+def test_generate_verify_and_list(tmp_path):
+    stylesim("generate", "highway", "--episodes", 1, "--out", tmp_path / "sim")
+    assert "sound" in stylesim("verify", tmp_path / "sim")
+    assert "highway" in stylesim("list", "scenarios")
