@@ -18,12 +18,14 @@ from stylesim.corpus.roads import write_road
 from stylesim.corpus.tables import DRIVER_PARAMETERS, SCALES, agents_table, parquet_bytes, signals_table, tracks_table
 from stylesim.errors import CorpusError, InputError
 from stylesim.scene import Scene
+from stylesim.version import __version__
 
 if TYPE_CHECKING:
     from stylesim.corpus.corpus import Corpus
 
 FORMAT = "stylesim-corpus"
 SCHEMA_VERSION = 1
+VERSIONS = {"stylesim": __version__, "polars": pl.__version__}
 SCENE_SCHEMA = {
     "scene_id": pl.String, "unit_id": pl.String, "source": pl.String, "scenario": pl.String,
     "source_scenario_id": pl.String, "official_split": pl.String, "split": pl.String, "start_s": pl.Float64,
@@ -87,7 +89,7 @@ class CorpusWriter:
         self._pending: list[tuple[Scene, str]] = []
         self._added = 0
         self._request = {"source": source, "seed": seed, "configuration": dict(configuration)}
-        request = json_bytes(self._request)
+        request = json_bytes({**self._request, "versions": VERSIONS})  # parts of another version do not mix
         marker = self.partial / "request.json"
         if self.partial.exists():
             if not resume:
@@ -178,14 +180,12 @@ class CorpusWriter:
         return Corpus(self.out)
 
     def _write_manifest(self, rows: list[dict[str, Any]], files: dict[str, str], counts: Mapping[str, int]) -> None:
-        from stylesim.version import __version__
-
         manifest = {
             "format": FORMAT, "schema_version": SCHEMA_VERSION, **self._request, "counts": dict(counts), "files": files,
             "n_scenes": len(rows), "n_agents": sum(row["n_agents"] for row in rows),
             "n_steps": sum(row["n_steps"] for row in rows), "dt_s": sorted({row["dt_s"] for row in rows}),
             "scales": {"position_m": POSITION_M, "velocity_mps": VELOCITY_MPS, "heading_rad": HEADING_RAD},
             "driver_parameters": list(DRIVER_PARAMETERS),
-            "versions": {"stylesim": __version__, "polars": pl.__version__},
+            "versions": VERSIONS,
         }  # fmt: skip
         write_whole(self.partial / "corpus.json", json_bytes(manifest))
