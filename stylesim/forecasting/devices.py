@@ -8,7 +8,6 @@ import torch
 from torch import Tensor, nn
 
 from stylesim.errors import MissingDependencyError, unknown
-from stylesim.forecasting.allocator import keep_freed_memory
 
 ACCELERATORS = ("auto", "cpu", "gpu")
 
@@ -70,7 +69,6 @@ def runtime(accelerator: str = "auto", precision: str = "32-true") -> Runtime:
     """Where to train: "cpu" needs nothing; "gpu" needs Lightning Fabric; "auto" is the GPU where there is one."""
     if accelerator not in ACCELERATORS:
         raise unknown("accelerator", accelerator, ACCELERATORS)
-    keep_freed_memory()
     if accelerator == "cpu" or (accelerator == "auto" and not torch.cuda.is_available()):
         return PlainRuntime()
     return FabricRuntime(accelerator="cuda", precision=precision)

@@ -10,7 +10,6 @@ from jaxtyping import Float32, Int64
 
 from stylesim.errors import InputError
 from stylesim.forecast import Forecast, ForecastTask
-from stylesim.forecasting.allocator import keep_freed_memory
 from stylesim.forecasting.batching import gather, to_scene
 from stylesim.forecasting.conditioner import StyleConditioner
 from stylesim.forecasting.config import ModelConfig
@@ -35,7 +34,6 @@ class TrainedForecaster:
         self.conditioner = conditioner
         self.training_curve: tuple[Mapping[str, float], ...] = ()  # one record per epoch, where the folder has them
         self._cutter = RoadCutter(network.config.inputs)
-        keep_freed_memory()
 
     @property
     def config(self) -> ModelConfig:
