@@ -173,6 +173,7 @@ def test_files_in_other_units_are_refused(tmp_path, spoil, says):
             "no readable CSV|no usable row",
         ),
     ],
+    ids=["cut", "no gzip", "empty", "two columns", "no rows", "bytes"],
 )
 def test_damaged_files_are_named(tmp_path, content, says):
     path = tmp_path / f"trajectories_{dlr.STAMP}.csv.gz"
