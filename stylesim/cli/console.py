@@ -19,7 +19,7 @@ from rich.progress import (
 )
 from rich.table import Table
 
-FILE_WIDTH = 140  # columns where the output is no terminal; chosen: the widest table, errors by style, fits
+FILE_WIDTH = 160  # columns where the output is no terminal; chosen: the widest table, errors by style, fits
 
 _out = Console(highlight=False, soft_wrap=True, width=None if sys.stdout.isatty() else FILE_WIDTH)
 _err = Console(stderr=True, highlight=False, soft_wrap=True)
