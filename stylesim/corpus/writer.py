@@ -25,6 +25,7 @@ if TYPE_CHECKING:
 
 FORMAT = "stylesim-corpus"
 SCHEMA_VERSION = 1
+PART_STEPS = 250_000  # agent-frames after which a part is closed: memory does not depend on how large scenes are
 VERSIONS = {"stylesim": __version__, "polars": pl.__version__}
 SCENE_SCHEMA = {
     "scene_id": pl.String, "unit_id": pl.String, "source": pl.String, "scenario": pl.String,
@@ -87,7 +88,8 @@ class CorpusWriter:
         self.out, self.partial = new_folder(out)
         self._part_scenes = part_scenes
         self._pending: list[tuple[Scene, str]] = []
-        self._added = 0
+        self._part = 0  # the number of the part that is being filled
+        self._filled = self._steps = 0  # scenes and agent-frames in it
         self._request = {"source": source, "seed": seed, "configuration": dict(configuration)}
         request = json_bytes({**self._request, "versions": VERSIONS})  # parts of another version do not mix
         marker = self.partial / "request.json"
@@ -122,18 +124,22 @@ class CorpusWriter:
         return {int(path.stem) for path in (self.partial / "records").glob("*.json")}
 
     def add(self, scene: Scene, *, split: str = "") -> None:
-        """Append a scene; every `part_scenes` scenes become a part. Parts from a resumed run are not rewritten."""
-        part = self._added // self._part_scenes
-        self._added += 1
-        if part not in self._done:
-            self._pending.append((scene, split))
-        if self._added % self._part_scenes == 0:
-            self._flush(part)
+        """Append a scene; a part holds `part_scenes` scenes, or fewer that are large.
 
-    def _flush(self, part: int) -> None:
+        Parts from a resumed run are not rewritten.
+        """
+        if self._part not in self._done:
+            self._pending.append((scene, split))
+        self._filled += 1
+        self._steps += int(scene.tracks.valid.sum())
+        if self._filled == self._part_scenes or self._steps >= PART_STEPS:
+            self._flush()
+
+    def _flush(self) -> None:
         if self._pending:
-            write_part(self.partial, part, [s for s, _ in self._pending], [split for _, split in self._pending])
-            self._pending = []
+            write_part(self.partial, self._part, [s for s, _ in self._pending], [split for _, split in self._pending])
+        self._pending, self._filled, self._steps = [], 0, 0
+        self._part += 1
 
     def finish(
         self,
@@ -145,7 +151,7 @@ class CorpusWriter:
         """Write the scene table and `corpus.json`, and give the folder its name. CorpusError if no scene was added."""
         from stylesim.corpus.corpus import Corpus
 
-        self._flush((self._added - 1) // self._part_scenes if self._added else 0)
+        self._flush()
         records = [json.loads(p.read_bytes()) for p in sorted((self.partial / "records").glob("*.json"))]
         rows = [row for record in records for row in record["scenes"]]
         if not rows:

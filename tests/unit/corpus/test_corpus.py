@@ -141,3 +141,13 @@ def test_the_scales_are_in_the_schema_of_the_file(tmp_path):
     corpus = write(tmp_path / "c")
     about = pl.read_parquet_metadata(corpus.path / "tracks" / "part-00000.parquet")
     assert {name: float(about[name]) for name in corpus.manifest["scales"]} == corpus.manifest["scales"]
+
+
+def test_large_scenes_make_smaller_parts(tmp_path, monkeypatch):
+    monkeypatch.setattr("stylesim.corpus.writer.PART_STEPS", 1000)
+    with CorpusWriter(tmp_path / "c", source="made", configuration={}) as writer:
+        for i in range(3):
+            writer.add(make_scene(f"scene-{i}"))  # 600-odd agent-frames each
+        corpus = writer.finish()
+    assert [info.part for info in corpus.info] == [0, 0, 1]
+    assert [scene.scene_id for scene in corpus] == ["scene-0", "scene-1", "scene-2"]
