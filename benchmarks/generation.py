@@ -1,6 +1,6 @@
 """Generation against the bare `sumo` program: same network, demand, models and seed; log and corpus included.
 
-    python -m benchmarks.generation [--runs 5] [--seconds 600] [--episodes 40]
+    python -m benchmarks.generation [--runs 5] [--seconds 600] [--episodes 100]
 
 Runs are interleaved (bare, SUMO's own Parquet output, stylesim). Times are CPU seconds (user and system, of the process
 that does the work, all threads), since other work on the machine would otherwise count; scaling is in wall seconds.
@@ -114,7 +114,7 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--runs", type=int, default=5)
     parser.add_argument("--seconds", type=float, default=600.0)
-    parser.add_argument("--episodes", type=int, default=40)
+    parser.add_argument("--episodes", type=int, default=100)
     asked = parser.parse_args()
     for name in ("ramp_merge", "yellow_light"):
         against_bare(name, runs=asked.runs, seconds=asked.seconds)
