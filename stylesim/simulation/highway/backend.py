@@ -11,7 +11,7 @@ from stylesim.scene import Scene
 from stylesim.simulation.highway.lanes import road_of
 from stylesim.simulation.highway.log import TrackLog
 from stylesim.simulation.highway.spec import LOG_HZ, options_of
-from stylesim.simulation.highway.traffic import JUNCTION_NODES, Crew, JunctionTraffic, Traffic, highway_traffic
+from stylesim.simulation.highway.traffic import Crew, Traffic, traffic_of
 from stylesim.tracks import TrackFlag, Tracks
 
 SOURCE = "highway_env"
@@ -31,11 +31,7 @@ class HighwayBackend:
         options = options_of(scenario)
         drawn = scenario.draw(stream(seed, episode, "", "parameters"))
         crew = Crew(population, seed=seed, episode=episode)
-        junction = options.layout == "intersection"
-        time_s = scenario.warm_up_s + scenario.duration_s
-        traffic = (
-            JunctionTraffic(options, drawn, crew) if junction else highway_traffic(options, drawn, crew, time_s=time_s)
-        )
+        traffic = traffic_of(options, drawn, crew, time_s=scenario.warm_up_s + scenario.duration_s)
         n_frames = round(scenario.duration_s * LOG_HZ)
         log = TrackLog(n_frames, 1.0 / LOG_HZ)
         for _ in range(round(scenario.warm_up_s * options.simulation_hz)):
@@ -55,7 +51,7 @@ class HighwayBackend:
             source=SOURCE,
             scenario=scenario.name,
             tracks=tracks,
-            road=road_of(traffic.road.network, junction_nodes=JUNCTION_NODES if junction else ""),
+            road=road_of(traffic.road.network, junction_nodes=traffic.junction_nodes),
             counts=_counts(tracks, traffic, log, removed_before_log=early),
             parameters=drawn,
         )

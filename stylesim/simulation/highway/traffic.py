@@ -49,6 +49,8 @@ class Crew:
 class Traffic:
     """A road full of styled cars; `removed` names those that were taken away, with the reason."""
 
+    junction_nodes = ""  # how the names of the nodes inside a junction begin; "" where there is none
+
     def __init__(self, road: StyledRoad, crew: Crew, options: HighwayOptions) -> None:
         self.road = road
         self.removed: dict[str, str] = {}
@@ -146,6 +148,8 @@ class Junction(IntersectionEnv):  # type: ignore[misc]
 class JunctionTraffic(Traffic):
     """Traffic that comes and goes by the intersection's own mechanics."""
 
+    junction_nodes = JUNCTION_NODES
+
     def __init__(self, options: HighwayOptions, drawn: Mapping[str, float], crew: Crew) -> None:
         self._junction = Junction(options, drawn, crew)
         super().__init__(self._junction.road, crew, options)
@@ -162,3 +166,10 @@ class JunctionTraffic(Traffic):
         self._steps += 1
         if self._steps % self._steps_per_turn == 0:
             self._junction.come_and_go()
+
+
+def traffic_of(options: HighwayOptions, drawn: Mapping[str, float], crew: Crew, *, time_s: float) -> Traffic:
+    """The traffic that the scenario's layout asks for, at its first moment; `time_s` is how long it must last."""
+    if options.layout == "intersection":
+        return JunctionTraffic(options, drawn, crew)
+    return highway_traffic(options, drawn, crew, time_s=time_s)
