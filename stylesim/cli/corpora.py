@@ -24,7 +24,7 @@ def options_of(pairs: list[str]) -> dict[str, str]:
 
 
 def read(
-    format: str = typer.Argument(help="Format of the recording (see `stylesim list datasets`)."),
+    format: str = typer.Argument(help="Format of the recording (see `stylesim datasets`), or auto: recognise it."),
     path: Path = typer.Argument(help="File or folder of the recording."),
     out: Path = typer.Option(..., "--out", help="Folder of the new corpus; must not exist."),
     option: list[str] = typer.Option(
@@ -38,6 +38,8 @@ def read(
     with progress_bar(f"reading {format}", "scenes") as progress:
         corpus = run(format, path, out=out, resume=resume, progress=progress, **options_of(option))
     show_table("Counted", ("what", "n"), sorted(corpus.manifest["counts"].items()))
+    if format == "auto":
+        say(f"recognised as {corpus.manifest['configuration']['format']}")
     say(f"{len(corpus)} scenes, {corpus.manifest['n_agents']} tracks, {corpus.manifest['n_steps']} agent-steps: {out}")
 
 

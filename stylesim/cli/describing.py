@@ -39,14 +39,29 @@ def list_(what: What = typer.Argument(help="What to list.")) -> None:
         ]
         show_table("Styles: parameters at the place of each class", ("parameter", *STYLE_CLASSES), parameters)
     else:
-        from stylesim.datasets.formats import FORMATS
+        datasets()
 
-        columns = ("name", "what", "Hz", "map", "signals", "licence of the data")
-        rows = [
-            (f.name, f.description, f"{f.rate_hz:g}", _yes(f.has_map), _yes(f.has_signals), f.licence)
-            for f in FORMATS.values()
-        ]
-        show_table("Data sets that `stylesim read` knows", columns, rows)
+
+def datasets() -> None:
+    """Every data set that can be read: its files, rate, map, signals, licence, and where to get it."""
+    from stylesim.datasets.formats import FORMATS
+
+    columns = ("name", "what it is", "files", "Hz", "map", "signals", "licence of the data", "from", "tested on")
+    rows = [
+        (
+            f.name,
+            f.description,
+            f.supports,
+            f"{f.rate_hz:g}",
+            _yes(f.has_map),
+            _yes(f.has_signals),
+            f.licence,
+            f.where,
+            f.tested_on,
+        )
+        for f in FORMATS.values()
+    ]
+    show_table("Data sets that `stylesim read` knows", columns, rows)
 
 
 def _yes(value: bool) -> str:
@@ -88,10 +103,10 @@ def describe(name: str = typer.Argument(help="A scenario, population, style or d
         _describe_style(name)
     elif name in FORMATS:
         f = FORMATS[name]
-        say(
-            f"{f.name}: {f.description}\nrate: {f.rate_hz:g} Hz\nmap: {_yes(f.has_map)}\nsignals: {_yes(f.has_signals)}"
-        )
+        say(f"{f.name}: {f.description}\nfiles: {f.supports}\nrate: {f.rate_hz:g} Hz")
+        say(f"map: {_yes(f.has_map)}\nsignals: {_yes(f.has_signals)}")
         say(f"options (-o KEY=VALUE): {', '.join(f.options) or 'none'}\nlicence: {f.licence}\nfrom: {f.where}")
+        say(f"tested on: {f.tested_on}")
     else:
         known = [*scenarios(), *populations(), *STYLE_CLASSES, *FORMATS]
         raise unknown("name", name, known)
@@ -100,4 +115,5 @@ def describe(name: str = typer.Argument(help="A scenario, population, style or d
 def add_to(app: typer.Typer) -> None:
     """Register the verbs."""
     app.command("list", epilog="Example: `stylesim list scenarios`")(list_)
+    app.command("datasets", epilog="Then: `stylesim read auto PATH --out runs/real`")(datasets)
     app.command("describe", epilog="Example: `stylesim describe yellow_light`")(describe)

@@ -20,6 +20,7 @@ from jaxtyping import Float64
 from stylesim.datasets.accounting import row_counts
 from stylesim.datasets.av2_map import read_map
 from stylesim.datasets.flagging import flagged_implausible
+from stylesim.datasets.sniffing import matching
 from stylesim.errors import InputError
 from stylesim.geometry import wrap_angle
 from stylesim.scene import Scene
@@ -81,6 +82,12 @@ def scenes(path: str | Path) -> Iterator[Scene]:
         yield _scene(folder, split)
     if not found:
         raise InputError(f"{root} holds no Argoverse 2 scenario (a folder with scenario_<id>.parquet)")
+
+
+def sniff(path: Path) -> bool:
+    """True for a scenario's folder, a split, or a root with splits."""
+    name = "scenario_*.parquet"
+    return path.is_dir() and bool(matching(path, name, f"*/{name}", f"*/*/{name}"))
 
 
 def _folders(root: Path) -> Iterator[tuple[Path, str]]:

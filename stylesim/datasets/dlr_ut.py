@@ -21,6 +21,7 @@ from stylesim.datasets.inferred_road import infer_road
 from stylesim.datasets.recording import Recording
 from stylesim.datasets.resampling import decimated
 from stylesim.datasets.site_roads import SiteRoad, load_site_road, site_road_at
+from stylesim.datasets.sniffing import header, matching
 from stylesim.datasets.stamps import Stamp
 from stylesim.errors import InputError
 from stylesim.road import Road
@@ -59,6 +60,13 @@ def scenes(path: str | Path, *, scene_s: float = SCENE_S, road: str = "site") ->
             scene_s=scene_s,
             unit_start_s=(begin - unit_begin) / 1e6,
         )
+
+
+def sniff(path: Path) -> bool:
+    """True for a trajectories file with the columns of DLR Urban Traffic, or a folder with one."""
+    files = [path] if path.is_file() else matching(path, "trajectories_*.csv", "trajectories_*.csv.gz")
+    names = set(header(files[0])) if files else set()
+    return {"center_easting", "classifications_van", "interpolated"} <= names and "acceleration_signed" not in names
 
 
 def _site(road: str, chosen: SiteRoad | None, raw: Recording) -> tuple[str, Road | None, Float64[np.ndarray, " 2"]]:

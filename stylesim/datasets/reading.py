@@ -8,7 +8,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from stylesim.datasets.accounting import added, checked
-from stylesim.datasets.formats import DatasetFormat, dataset_format
+from stylesim.datasets.format import DatasetFormat
+from stylesim.datasets.formats import AUTO, dataset_format, recognised
 from stylesim.errors import InputError, unknown
 
 if TYPE_CHECKING:
@@ -24,7 +25,7 @@ def read(
     progress: Callable[[int, int], None] | None = None,
     **options: Any,
 ) -> Corpus:
-    """Read a data set of that format into a new corpus at `out`.
+    """Read a data set of that format into a new corpus at `out`; "auto" recognises the format by its files.
 
     Streams scene by scene; the counts of rows in, out and dropped by reason are summed, held against what was
     written, and stored in the corpus. `progress` is called with (scenes done, 0): how many there will be is not
@@ -34,9 +35,10 @@ def read(
     """
     from stylesim.corpus import CorpusWriter
 
-    chosen = dataset_format(format)
-    options = _checked_options(chosen, options)
     source = Path(path)
+    chosen = recognised(source) if format == AUTO else dataset_format(format)
+    format = chosen.name
+    options = _checked_options(chosen, options)
     if not source.exists():
         raise InputError(f"{source} does not exist; {format} is to be had from {chosen.where}")
     configuration = {"format": format, "options": dict(sorted(options.items())), "licence": chosen.licence}

@@ -6,7 +6,10 @@ import json
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import polars as pl
+
+from tests.formats.mutations import mutated_frame
 
 ID = "0a0a0000-0000-0000-0000-000000000001"
 
@@ -66,3 +69,16 @@ def write(parent: Path, *, scenario_id: str = ID, frame: pl.DataFrame | None = N
     frame.write_parquet(folder / f"scenario_{scenario_id}.parquet")
     (folder / f"log_map_archive_{scenario_id}.json").write_text(json.dumps(vector_map()))
     return folder
+
+
+def sample(folder: Path) -> Path:
+    """Two scenarios of the training split."""
+    for name in ("a", "b"):
+        write(folder / "train", scenario_id=name)
+    return folder
+
+
+def mutate(folder: Path, rng: np.random.Generator) -> None:
+    """Damage the values of one table."""
+    file = sorted(folder.rglob("*.parquet"))[0]
+    mutated_frame(pl.read_parquet(file), rng).write_parquet(file)

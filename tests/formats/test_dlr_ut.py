@@ -11,7 +11,7 @@ from stylesim.scene import Scene
 from stylesim.signals import SignalState
 from stylesim.tracks import AgentKind
 from tests.conftest import ROOT
-from tests.formats import dlr_files as dlr
+from tests.formats import dlr_ut_files as dlr
 
 SHIPPED = ROOT / "data" / "dlr_ut"
 HEADER = ",".join(dlr.COLUMNS).encode() + b"\n"

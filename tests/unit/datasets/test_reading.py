@@ -4,7 +4,7 @@ import pytest
 from stylesim.datasets import formats, read
 from stylesim.datasets.accounting import AccountingError, added, checked, row_counts
 from stylesim.errors import InputError
-from tests.formats import dlr_files
+from tests.formats import dlr_ut_files
 
 
 def test_an_unknown_format_names_the_nearest(tmp_path):
@@ -34,7 +34,7 @@ def test_rows_that_vanish_unsaid_are_an_error():
 
 
 def test_an_interrupted_read_leaves_nothing_under_the_final_name_and_resumes(tmp_path):
-    dlr_files.write(tmp_path / "in", dlr_files.rows(n_frames=1700))
+    dlr_ut_files.write(tmp_path / "in", dlr_ut_files.rows(n_frames=1700))
 
     def stop(done, _):
         if done == 3:
@@ -49,7 +49,7 @@ def test_an_interrupted_read_leaves_nothing_under_the_final_name_and_resumes(tmp
 
 
 def test_scene_length_and_road_are_options(tmp_path):
-    dlr_files.write(tmp_path / "in", dlr_files.rows(n_frames=800, n_agents=5))
+    dlr_ut_files.write(tmp_path / "in", dlr_ut_files.rows(n_frames=800, n_agents=5))
     corpus = read("dlr_ut", tmp_path / "in", out=tmp_path / "out", scene_s=11.0, road="none")
     assert [info.n_frames for info in corpus.info] == [110, 110, 110, 70]
     assert all(scene.road is None for scene in corpus)

@@ -66,3 +66,12 @@ def write_lights(folder: Path, events: list[tuple[float, int, int]], *, stamp: s
     path = folder / f"traffic-lights_{stamp}.csv.gz"
     path.write_bytes(gzip.compress(("timestamp,id,state\n" + "\n".join(lines) + "\n").encode(), mtime=0))
     return path
+
+
+def sample(folder: Path) -> Path:
+    """A recording of 45 s with lights, interpolated rows and a damaged one."""
+    table = rows(n_frames=900, interpolated=((0, 30), (0, 31), (1, 899)))
+    table[3]["timestamp"] = "garbage"
+    write(folder, table)
+    write_lights(folder, [(float(t), 1, 3 + 2 * (t % 2)) for t in range(45)])
+    return folder

@@ -1,0 +1,62 @@
+"""What a damaged or hostile file makes a parser raise becomes one error that names the file."""
+
+from __future__ import annotations
+
+import binascii
+import sqlite3
+import struct
+import zlib
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+from stylesim.errors import InputError, StylesimError
+
+MAX_BYTES = 4 << 30  # chosen: larger than any single file of the formats; a bigger one is refused, not loaded
+
+
+@contextmanager
+def reading(file: Path, what: str) -> Iterator[None]:
+    """A block that parses `file`, which should be `what` ("an Argoverse 2 map").
+
+    InputError naming the file for everything that bad content can raise; errors of ours pass unchanged.
+    """
+    import polars as pl
+
+    try:
+        yield
+    except StylesimError:
+        raise
+    except OSError as error:
+        raise InputError(f"cannot read {file}: {error.strerror or error}") from error
+    except (
+        ValueError,  # with it json.JSONDecodeError, UnicodeDecodeError, shapes that do not fit
+        LookupError,
+        TypeError,
+        AttributeError,
+        ArithmeticError,
+        EOFError,
+        MemoryError,
+        RecursionError,
+        struct.error,
+        zlib.error,
+        binascii.Error,
+        sqlite3.Error,
+        pl.exceptions.PolarsError,
+        pl.exceptions.PanicException,
+    ) as error:
+        reason = (str(error).splitlines() or [""])[0][:300]
+        raise InputError(f"{file} is damaged or no {what} ({type(error).__name__}: {reason}); get it again") from error
+
+
+def bounded(file: Path, limit: int = MAX_BYTES) -> Path:
+    """The file, if it is one and not too large; else InputError."""
+    try:
+        if not file.is_file():
+            raise InputError(f"{file} does not exist or is no file")
+        size = file.stat().st_size
+    except OSError as error:
+        raise InputError(f"cannot read {file}: {error.strerror or error}") from error
+    if size > limit:
+        raise InputError(f"{file} has {size} bytes, more than the {limit} that a file of its kind can have")
+    return file
