@@ -14,7 +14,7 @@ from stylesim.errors import InputError, unknown
 from stylesim.resources import agents_dir
 from stylesim.specs import Spec, load_yaml
 from stylesim.style import CLASS_INTERVAL, CLASS_KNOB, STYLE_CLASSES, DriverStyle
-from stylesim.styles import style_table
+from stylesim.styles import OTHER, load_calibration, style_table
 
 SHARE_TOLERANCE = 1e-6
 
@@ -46,6 +46,7 @@ class Population:
     """Shares of the six classes; within a class the knob is drawn from its whole interval (or its centre).
 
     `within_class="neutral"` puts everybody at knob 0 (the reference that scalers are fitted on), whatever the shares.
+    `calibration` is a file of `stylesim calibrate` to drive by, in place of what ships for the backend.
     """
 
     name: str
@@ -53,6 +54,7 @@ class Population:
     within_class: str = "interval"
     about: str = ""
     source: str = ""
+    calibration: str = ""
 
     def __post_init__(self) -> None:
         """Check the shares."""
@@ -102,18 +104,27 @@ class Population:
         scale = max(left, 0.0) / rest if rest > 0 else 0.0
         merged = {name: shares.get(name, share * scale) for name, share in self.by_class.items()}
         changed = ",".join(f"{name}={share:g}" for name, share in shares.items())
-        return Population(f"{self.name}+{changed}", tuple(merged.values()), self.within_class, self.about, self.source)
+        return replace(self, name=f"{self.name}+{changed}", shares=tuple(merged.values()))
 
-    def draw(self, rng: np.random.Generator) -> DriverStyle:
-        """One driver: class by share, place on the knob within the class, then individual variation."""
+    def calibrated(self, path: str | Path) -> Population:
+        """This population, driving by the calibration in that file. InputError if it does not fit."""
+        load_calibration(Path(path).absolute())
+        return replace(self, calibration=str(Path(path).absolute()))
+
+    def draw(self, rng: np.random.Generator, *, backend: str = "", road: str = OTHER) -> DriverStyle:
+        """One driver: class by share, place on the knob within the class, then individual variation.
+
+        `backend` chooses the calibrated parameters, `road` those of the kind of road (`styles.road_kind`) it enters by.
+        """
+        table = style_table(backend, calibration=Path(self.calibration) if self.calibration else None)
         if self.within_class == "neutral":
-            return replace(style_table().at(0.0, rng), name="neutral")
+            return replace(table.at(0.0, rng), name="neutral")
         name = STYLE_CLASSES[int(rng.choice(len(self.shares), p=np.array(self.shares) / sum(self.shares)))]
         low, high = CLASS_INTERVAL[name]
         knob = CLASS_KNOB[name] if self.within_class == "centre" else float(rng.uniform(low, high))
-        return style_table().at(knob, rng)
+        return table.at(knob, rng, road=road)
 
 
 def populations() -> tuple[str, ...]:
     """Names of the shipped populations."""
-    return tuple(sorted(p.stem for p in agents_dir().glob("*.yaml") if p.stem != "styles"))
+    return tuple(sorted(p.stem for p in agents_dir().glob("*.yaml") if p.stem.split(".")[0] != "styles"))

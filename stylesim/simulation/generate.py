@@ -20,6 +20,7 @@ from stylesim.resources import agents_dir
 from stylesim.scenario import Scenario, load_scenario
 from stylesim.simulation.pool import Pool
 from stylesim.simulation.workers import Job, Task
+from stylesim.styles import calibration_file
 
 SIMULATORS = {"sumo": "libsumo", "highway": "highway-env"}  # backend: distribution whose version is recorded
 SOURCE = "simulation"
@@ -146,14 +147,26 @@ def _configuration(job: Job, episodes: int) -> dict[str, Any]:
             continue  # the worker says it better when it opens the backend
     return {
         "episodes": episodes,
-        "population": {**asdict(job.population), "shares": list(job.population.shares)},
+        "population": _population(job.population),
         "scenarios": [
             {**scenario.model_dump(mode="json", exclude={"folder"}), "files": _files(scenario)}
             for scenario in job.scenarios
         ],
         "simulators": installed,
         "styles_sha256": sha256_of(agents_dir() / "styles.yaml"),
+        "calibrations_sha256": {
+            backend: sha256_of(path)
+            for backend in sorted({scenario.backend for scenario in job.scenarios})
+            if (path := calibration_file(backend)) is not None and not job.population.calibration
+        },
     }
+
+
+def _population(population: Population) -> dict[str, Any]:
+    """The population, its calibration file by content."""
+    given = population.calibration
+    shares = list(population.shares)
+    return {**asdict(population), "shares": shares, "calibration": sha256_of(Path(given)) if given else ""}
 
 
 def _files(scenario: Scenario) -> dict[str, str]:

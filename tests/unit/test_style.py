@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 from stylesim.errors import InputError
 from stylesim.population import Population, populations
 from stylesim.style import CLASS_INTERVAL, CLASS_KNOB, PHYSICAL_FIELDS, STYLE_CLASSES, class_of_knob
-from stylesim.styles import style_table
+from stylesim.styles import MOTORWAY, load_calibration, road_kind, style_table
 
 
 def test_every_class_sits_at_its_place_of_the_knob():
@@ -98,3 +98,60 @@ def test_all_shipped_populations_are_listed():
     assert set(populations()) >= {"naturalistic", "tdbm_spectrum", "rare_heavy"}
     assert "styles" not in populations()
     assert len(STYLE_CLASSES) == 6
+
+
+CALIBRATED = """
+about: made
+backend: sumo
+roads:
+  motorway:
+    lane_wander_m:
+      aggressive: {calm: 0.4, bold: 0.5}
+      reckless: {calm: 0.6, bold: 0.6, spread: 0.1}
+      threatening: {calm: 0.1, bold: 0.1}
+      careful: {calm: 0.3, bold: 0.3}
+      cautious: {calm: 0.1, bold: 0.1}
+      timid: {calm: 0.05, bold: 0.05}
+"""
+
+
+def calibrated(tmp_path, text=CALIBRATED):
+    path = tmp_path / "styles.sumo.yaml"
+    path.write_text(text)
+    return path
+
+
+def test_a_calibrated_class_has_its_own_range_up_to_its_border(tmp_path):
+    table = style_table("sumo", calibration=calibrated(tmp_path))
+    assert table.at(0.801, road=MOTORWAY).lane_wander_m == pytest.approx(0.4005)
+    assert table.at(1.0, road=MOTORWAY).lane_wander_m == 0.5
+    assert table.at(0.799, road=MOTORWAY).lane_wander_m == 0.6  # reckless begins here
+    assert table.at(0.0, road=MOTORWAY) == style_table().at(0.0)  # neutral stays the anchor
+    assert table.at(0.9) == style_table().at(0.9)  # nothing was calibrated for other roads
+
+
+def test_a_population_drives_by_the_calibration_that_it_is_given(tmp_path):
+    crowd = Population.of(aggressive=1.0).calibrated(calibrated(tmp_path))
+    rng = np.random.default_rng(0)
+    drawn = [crowd.draw(rng, backend="sumo", road=MOTORWAY).lane_wander_m for _ in range(50)]
+    assert 0.4 <= min(drawn) < max(drawn) <= 0.5
+    with pytest.raises(InputError, match="calibrated for 'sumo'"):
+        crowd.draw(rng, backend="highway")
+
+
+@pytest.mark.parametrize(
+    ("change", "says"),
+    [
+        (("lane_wander_m", "lane_wonder_m"), "Did you mean 'lane_wander_m'"),
+        (("timid:", "timidd:"), "must name each of"),
+        (("motorway", "motorways"), "roads.motorways"),
+        (("bold: 0.5", "bolt: 0.5"), "did you mean 'bold'"),
+    ],
+)
+def test_a_calibration_that_does_not_fit_is_refused(tmp_path, change, says):
+    with pytest.raises(InputError, match=says):
+        load_calibration(calibrated(tmp_path, CALIBRATED.replace(*change)))
+
+
+def test_the_kind_of_road_follows_from_the_limit():
+    assert [road_kind(v) for v in (None, 19.4, 22.22, 33.3)] == ["other", "other", "motorway", "motorway"]
