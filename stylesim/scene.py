@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from types import MappingProxyType
+from typing import Any
 
 from stylesim.road import Road
 from stylesim.signals import Signals
@@ -19,6 +20,8 @@ class Scene:
     `start_s` is the time of frame 0 on the unit's clock. `source` is the reader's or backend's name
     ("dlr_ut", "av2", "sumo", "highway_env"), `scenario` the scenario family or the recorded site.
     `t0_frame` is the last history frame where the source fixes it (Argoverse 2: 49), else None.
+    `twin_of` is the scene_id of the episode that this is a counterfactual of, `replay_of` that of the recorded scene
+    that it was started from ("" for neither); `metadata` (JSON values) says how, and which stressors happened when.
     """
 
     scene_id: str
@@ -34,6 +37,9 @@ class Scene:
     t0_frame: int | None = None
     counts: Mapping[str, int] = field(default_factory=dict)  # collisions, dropped rows, … of this scene
     parameters: Mapping[str, float] = field(default_factory=dict)  # what was drawn for this episode
+    twin_of: str = ""
+    replay_of: str = ""
+    metadata: Mapping[str, Any] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         """Check ids and clocks."""
@@ -43,11 +49,12 @@ class Scene:
             raise ValueError("signals and tracks differ in their number of frames")
         object.__setattr__(self, "counts", MappingProxyType(dict(self.counts)))
         object.__setattr__(self, "parameters", MappingProxyType(dict(self.parameters)))
+        object.__setattr__(self, "metadata", MappingProxyType(dict(self.metadata)))
 
     def history(self, t0: int, steps: int) -> Scene:
         """What is known at frame t0 (see `Tracks.history`): no later frame, no commanded style, no outcome.
 
-        `counts` and `parameters` go too: a drawn cycle time would tell when the light changes.
+        `counts`, `parameters` and `metadata` go too: a drawn cycle time would tell when the light changes.
         """
         tracks = self.tracks.history(t0, steps)
         first = t0 + 1 - tracks.n_frames
@@ -59,5 +66,6 @@ class Scene:
             start_s=self.start_s + first * tracks.dt_s,
             counts={},
             parameters={},
+            metadata={},
             t0_frame=None,
         )

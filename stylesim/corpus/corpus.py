@@ -5,7 +5,7 @@ from __future__ import annotations
 import hashlib
 import json
 from collections.abc import Callable, Iterable, Iterator, Mapping
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, field, fields
 from functools import cached_property
 from pathlib import Path
 from typing import Any
@@ -45,11 +45,17 @@ class SceneInfo:
     counts: Mapping[str, int]
     parameters: Mapping[str, float]
     row: Mapping[str, Any]
+    twin_of: str = ""  # scene_id of the episode that it is a counterfactual of
+    replay_of: str = ""  # scene_id of the recorded scene that it was started from
+    metadata: Mapping[str, Any] = field(default_factory=dict)
+
+
+SINCE_2 = {"twin_of": "", "replay_of": "", "metadata": "{}"}  # what scenes of schema version 1 do not say
 
 
 def _info(row: dict[str, Any]) -> SceneInfo:
     plain = {f.name: row[f.name] for f in fields(SceneInfo) if f.name in row}
-    plain |= {"counts": json.loads(row["counts"]), "parameters": json.loads(row["parameters"])}
+    plain |= {name: json.loads(row[name]) for name in ("counts", "parameters", "metadata")}
     return SceneInfo(**plain, row=row)
 
 
@@ -95,10 +101,11 @@ class Corpus:
         if self._chosen is not None:
             return self._chosen
         table = read_parquet(self.path / "scenes.parquet")
-        missing = set(SCENE_SCHEMA) - set(table.columns)
+        older = SINCE_2 if int(self.manifest["schema_version"]) < 2 else {}
+        missing = set(SCENE_SCHEMA) - set(table.columns) - set(older)
         if missing:
             raise CorpusError(f"{self.path / 'scenes.parquet'} lacks the column(s) {', '.join(sorted(missing))}")
-        return tuple(_info(row) for row in table.iter_rows(named=True))
+        return tuple(_info(older | row) for row in table.iter_rows(named=True))
 
     def __len__(self) -> int:
         """Number of scenes."""
@@ -155,6 +162,7 @@ class Corpus:
             scene_id=info.scene_id, unit_id=info.unit_id, source=info.source, scenario=info.scenario, tracks=tracks,
             road=road, signals=signals, start_s=info.start_s, source_scenario_id=info.source_scenario_id,
             official_split=info.official_split, t0_frame=info.t0_frame, counts=info.counts, parameters=info.parameters,
+            twin_of=info.twin_of, replay_of=info.replay_of, metadata=info.metadata,
         )  # fmt: skip
 
     def has_labels(self, method: str, span: str) -> bool:

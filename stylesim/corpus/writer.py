@@ -24,7 +24,7 @@ if TYPE_CHECKING:
     from stylesim.corpus.corpus import Corpus
 
 FORMAT = "stylesim-corpus"
-SCHEMA_VERSION = 1
+SCHEMA_VERSION = 2  # 2 added twin_of, replay_of and metadata to the scenes
 PART_STEPS = 250_000  # agent-frames after which a part is closed: memory does not depend on how large scenes are
 VERSIONS = {"stylesim": __version__, "polars": pl.__version__}
 SCENE_SCHEMA = {
@@ -32,7 +32,8 @@ SCENE_SCHEMA = {
     "source_scenario_id": pl.String, "official_split": pl.String, "split": pl.String, "start_s": pl.Float64,
     "dt_s": pl.Float64, "n_frames": pl.Int32, "n_agents": pl.Int32, "n_steps": pl.Int64, "t0_frame": pl.Int32,
     "part": pl.Int32, "number": pl.Int32, "road": pl.String, "origin_x_m": pl.Float64, "origin_y_m": pl.Float64,
-    "counts": pl.String, "parameters": pl.String, "signals": pl.String,
+    "counts": pl.String, "parameters": pl.String, "signals": pl.String, "twin_of": pl.String, "replay_of": pl.String,
+    "metadata": pl.String,
 }  # fmt: skip
 
 
@@ -47,6 +48,8 @@ def _scene_row(scene: Scene, split: str, part: int, number: int, road: str) -> d
         "number": number, "road": road, "origin_x_m": float(tracks.origin_m[0]),
         "origin_y_m": float(tracks.origin_m[1]), "counts": json.dumps(dict(scene.counts), sort_keys=True),
         "parameters": json.dumps(dict(scene.parameters), sort_keys=True), "signals": signals,
+        "twin_of": scene.twin_of, "replay_of": scene.replay_of,
+        "metadata": json.dumps(dict(scene.metadata), sort_keys=True),
     }  # fmt: skip
 
 

@@ -167,7 +167,12 @@ def _scenes(plan: _Plan) -> Iterator[tuple[SceneKey, Scene]]:
         if plan.noise and scene.source not in recorded:
             number = stream(plan.seed, 0, scene.unit_id, "sensor").integers(len(plan.noise))
             scene = with_noise(scene, plan.noise[int(number)], seed=plan.seed)
-        yield key, replace(scene, scene_id=plan.new_id[key])
+        yield key, replace(scene, scene_id=plan.new_id[key], twin_of=_renamed(plan, key[0], scene.twin_of))
+
+
+def _renamed(plan: _Plan, number: int, scene_id: str) -> str:
+    """The new id of a scene that another one of the same input is paired with; as it was where that one was dropped."""
+    return plan.new_id.get((number, scene_id), scene_id)
 
 
 def _weights(plan: _Plan, balance: str) -> dict[ROW, float]:

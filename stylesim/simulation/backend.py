@@ -9,6 +9,7 @@ from stylesim.errors import unknown
 from stylesim.population import Population
 from stylesim.scenario import Scenario
 from stylesim.scene import Scene
+from stylesim.simulation.plan import PLAIN, EpisodePlan
 
 
 @runtime_checkable
@@ -20,8 +21,10 @@ class Backend(Protocol):
         """The backend's name as in `Scenario.backend`."""
         ...
 
-    def run_episode(self, scenario: Scenario, population: Population, *, seed: int, episode: int) -> Scene:
-        """One episode from its first to its last frame.
+    def run_episode(
+        self, scenario: Scenario, population: Population, *, seed: int, episode: int, plan: EpisodePlan = PLAIN
+    ) -> Scene:
+        """One episode from its first to its last frame, with what `plan` adds to it.
 
         Every random number comes from `stylesim.randomness.stream(seed, episode, driver, purpose)`.
         Raises InputError for a scenario that does not fit, SimulationError where the simulator refuses it.

@@ -7,7 +7,7 @@ import platform
 import time
 from collections import Counter
 from collections.abc import Callable, Sequence
-from dataclasses import asdict
+from dataclasses import asdict, replace
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import Any
@@ -18,7 +18,9 @@ from stylesim.errors import InputError, SimulationError
 from stylesim.population import Population
 from stylesim.resources import agents_dir
 from stylesim.scenario import Scenario, load_scenario
+from stylesim.simulation.plan import PLAIN, EpisodePlan, TwinRequest
 from stylesim.simulation.pool import Pool
+from stylesim.simulation.twins import LEAST_AHEAD_S
 from stylesim.simulation.workers import Job, Task
 from stylesim.styles import calibration_file
 
@@ -36,11 +38,14 @@ def generate(
     out: str | Path,
     workers: int = 1,
     resume: bool = False,
+    plan: EpisodePlan = PLAIN,
+    twins: TwinRequest | None = None,
     progress: Callable[[int, int], None] | None = None,
 ) -> Corpus:
     """Simulate `episodes` of every scenario into one new corpus at `out`.
 
-    Part number = place of the scenario x episodes + episode, one scene each. The same arguments give the same
+    Part number = place of the scenario x episodes + episode, one scene each (and its twins, if `twins` asks for them:
+    see `simulation.twins`; `twin_of` pairs them). `plan` holds for every episode. The same arguments give the same
     bytes, whatever `workers` and however often it was interrupted and resumed; `run.json` holds what differs.
     Realised drivers per style are in the counts as `drivers.<style>` (see `realised_styles`).
 
@@ -49,6 +54,8 @@ def generate(
     CorpusError where the disk refuses; finished episodes are kept then, under `out.partial`.
     """
     job = _checked(scenarios, population, episodes=episodes, seed=seed, out=Path(out), workers=workers)
+    job = replace(job, plan=plan, twins=twins)
+    _check_twins(job)
     request: dict[str, Any] = {"source": SOURCE, "seed": seed, "configuration": _configuration(job, episodes)}
     if Path(out).exists():
         return _finished(Path(out), request, resume=resume)
@@ -137,6 +144,19 @@ def _checked(
     return Job(loaded, crowd, seed, partial)
 
 
+def _check_twins(job: Job) -> None:
+    """InputError for a switch of style at a time that leaves too little of an episode."""
+    if job.twins is None or job.twins.at_s is None:
+        return
+    for scenario in job.scenarios:
+        latest = scenario.duration_s - LEAST_AHEAD_S
+        if not job.twins.at_s < latest:
+            raise InputError(
+                f"twins at {job.twins.at_s:g} s: scenario {scenario.name!r} logs {scenario.duration_s:g} s, and "
+                f"{LEAST_AHEAD_S:g} s must be left to see a difference; choose a time below {latest:g} s"
+            )
+
+
 def _configuration(job: Job, episodes: int) -> dict[str, Any]:
     """Everything that the bytes depend on, without any path."""
     installed = {}
@@ -147,6 +167,8 @@ def _configuration(job: Job, episodes: int) -> dict[str, Any]:
             continue  # the worker says it better when it opens the backend
     return {
         "episodes": episodes,
+        "plan": job.plan.model_dump(mode="json"),
+        "twins": None if job.twins is None else job.twins.model_dump(mode="json"),
         "population": _population(job.population),
         "scenarios": [
             {**scenario.model_dump(mode="json", exclude={"folder"}), "files": _files(scenario)}

@@ -26,6 +26,8 @@ from stylesim.population import Population
 from stylesim.scenario import Scenario
 from stylesim.scene import Scene
 from stylesim.simulation.backend import Backend, open_backend
+from stylesim.simulation.plan import PLAIN, EpisodePlan, TwinRequest
+from stylesim.simulation.twins import twins_of
 
 
 @runtime_checkable
@@ -53,6 +55,8 @@ class Job:
     population: Population
     seed: int
     partial: Path  # the corpus under construction
+    plan: EpisodePlan = PLAIN  # of every episode
+    twins: TwinRequest | None = None
 
     def to_dict(self) -> dict[str, Any]:
         """The JSON form."""
@@ -61,6 +65,8 @@ class Job:
             "population": asdict(self.population),
             "seed": self.seed,
             "partial": str(self.partial),
+            "plan": self.plan.model_dump(mode="json"),
+            "twins": None if self.twins is None else self.twins.model_dump(mode="json"),
         }
 
     @classmethod
@@ -72,6 +78,8 @@ class Job:
             Population(**population),
             raw["seed"],
             Path(raw["partial"]),
+            EpisodePlan.model_validate(raw["plan"]),
+            None if raw["twins"] is None else TwinRequest.model_validate(raw["twins"]),
         )
 
 
@@ -79,6 +87,11 @@ def with_driver_counts(scene: Scene) -> Scene:
     """The scene with the realised number of drivers of each style added to its counts as `drivers.<style>`."""
     styles = Counter(driver.name for driver in scene.tracks.driver if driver is not None)
     return replace(scene, counts={**scene.counts, **{f"drivers.{name}": n for name, n in sorted(styles.items())}})
+
+
+def with_count(scene: Scene, name: str, n: int) -> Scene:
+    """The scene with one count more."""
+    return replace(scene, counts={**scene.counts, name: n})
 
 
 class EpisodeRunner:
@@ -95,11 +108,26 @@ class EpisodeRunner:
                 backend.prepare(scenario)
 
     def run(self, task: Task) -> None:
-        """Run one episode and write it. StylesimError, with the part absent, if that is not possible."""
+        """Run one episode and its twins and write them as one part.
+
+        StylesimError, with the part absent, if that is not possible.
+        """
+        write_part(self._job.partial, task.part, self.scenes(task))
+
+    def scenes(self, task: Task) -> list[Scene]:
+        """The episode, then its twins; who drives is counted in the first only, because it is the same people."""
         job, scenario = self._job, self._job.scenarios[task.scenario]
         backend = self._backends[scenario.backend]
-        scene = backend.run_episode(scenario, job.population, seed=job.seed, episode=task.episode)
-        write_part(job.partial, task.part, [with_driver_counts(scene)])
+        key = {"seed": job.seed, "episode": task.episode}
+        scene = backend.run_episode(scenario, job.population, **key, plan=job.plan)
+        made = [with_driver_counts(scene)]
+        if job.twins is not None:
+            twins = twins_of(scene, job.twins, **key)
+            made[0] = with_count(made[0], "twins" if twins else "episodes_without_a_twin", max(1, len(twins)))
+            for twin in twins:
+                plan = job.plan.model_copy(update={"twin": twin})
+                made.append(backend.run_episode(scenario, job.population, **key, plan=plan))
+        return made
 
     def close(self) -> None:
         """End every simulation."""

@@ -12,6 +12,7 @@ from stylesim.simulation.highway.lanes import road_of
 from stylesim.simulation.highway.log import TrackLog
 from stylesim.simulation.highway.spec import LOG_HZ, options_of
 from stylesim.simulation.highway.traffic import Crew, Traffic, traffic_of
+from stylesim.simulation.plan import PLAIN, EpisodePlan
 from stylesim.tracks import TrackFlag, Tracks
 
 SOURCE = "highway_env"
@@ -26,7 +27,9 @@ class HighwayBackend:
         """Check that the scenario can be run; InputError naming file and key if not."""
         options_of(scenario)
 
-    def run_episode(self, scenario: Scenario, population: Population, *, seed: int, episode: int) -> Scene:
+    def run_episode(
+        self, scenario: Scenario, population: Population, *, seed: int, episode: int, plan: EpisodePlan = PLAIN
+    ) -> Scene:
         """One episode at 10 Hz; the same arguments give the same scene. InputError for options that do not fit."""
         options = options_of(scenario)
         drawn = scenario.draw(stream(seed, episode, "", "parameters"))
@@ -45,7 +48,7 @@ class HighwayBackend:
                 traffic.advance()
         tracks = log.tracks(set(traffic.removed))
         scene_id = f"{scenario.name}-{seed}-{episode:05d}"
-        return Scene(
+        scene = Scene(
             scene_id=scene_id,
             unit_id=scene_id,
             source=SOURCE,
@@ -55,6 +58,7 @@ class HighwayBackend:
             counts=_counts(tracks, traffic, log, removed_before_log=early),
             parameters=drawn,
         )
+        return plan.applied_to(scene)
 
     def close(self) -> None:
         """Nothing is held."""

@@ -8,6 +8,7 @@ from pathlib import Path
 from stylesim.population import Population
 from stylesim.scenario import Scenario
 from stylesim.scene import Scene
+from stylesim.simulation.plan import PLAIN, EpisodePlan
 from stylesim.simulation.sumo.engine import Engine
 from stylesim.simulation.sumo.episode import DT_S, EpisodeFiles, prepare_episode, sumo_options
 from stylesim.simulation.sumo.recorder import RawLog, Recorder
@@ -29,7 +30,9 @@ class SumoBackend:
     def __init__(self) -> None:
         self._engine = Engine()
 
-    def run_episode(self, scenario: Scenario, population: Population, *, seed: int, episode: int) -> Scene:
+    def run_episode(
+        self, scenario: Scenario, population: Population, *, seed: int, episode: int, plan: EpisodePlan = PLAIN
+    ) -> Scene:
         """One episode as a scene: the frames after the warm-up, every 0.1 s.
 
         A vehicle is logged from 3 s after its insertion (it finds its speed and lane until then; the dropped steps are
@@ -38,7 +41,7 @@ class SumoBackend:
         with tempfile.TemporaryDirectory(prefix="stylesim-") as folder:
             files = prepare_episode(scenario, population, seed=seed, episode=episode, folder=Path(folder))
             log, decisions = self.simulate(files)
-        return scene_of(log, decisions, files, name=scenario.name)
+        return plan.applied_to(scene_of(log, decisions, files, name=scenario.name))
 
     def simulate(self, files: EpisodeFiles) -> tuple[RawLog, list[DecisionEvent]]:
         """Steps through a prepared episode; what was logged and what was decided at yellow lights."""

@@ -2,6 +2,7 @@ from __future__ import annotations
 
 import errno
 import json
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -38,6 +39,30 @@ def test_what_goes_in_comes_out(tmp_path):
         assert got.signals.lane_id == want.signals.lane_id
         np.testing.assert_allclose(got.road.lanes[1].centre_line_m, want.road.lanes[1].centre_line_m, atol=6e-4)
         assert got.road.lanes[1].right_neighbour == "right"
+
+
+def test_pairs_and_metadata_come_back(tmp_path):
+    about = {"twin": {"driver": "car-1", "at_s": 3.5}, "events": [{"kind": "deer"}]}
+    with CorpusWriter(tmp_path / "c", source="made", configuration={}) as writer:
+        writer.add(make_scene("a"))
+        writer.add(replace(make_scene("a-twin"), twin_of="a", replay_of="r", metadata=about))
+        corpus = writer.finish()
+    assert [(info.twin_of, info.replay_of, info.metadata) for info in corpus.info] == [("", "", {}), ("a", "r", about)]
+    twin = corpus.scene("a-twin")
+    assert (twin.twin_of, twin.replay_of, twin.metadata) == ("a", "r", about)
+    assert twin.history(20, 10).metadata == {}
+
+
+def test_a_corpus_of_version_1_is_read(tmp_path):
+    corpus = write(tmp_path / "c")
+    table = pl.read_parquet(corpus.path / "scenes.parquet").drop("twin_of", "replay_of", "metadata")
+    table.write_parquet(corpus.path / "scenes.parquet")
+    with pytest.raises(CorpusError, match="lacks the column"):
+        _ = Corpus(corpus.path).info
+    (corpus.path / "corpus.json").write_text(json.dumps({**corpus.manifest, "schema_version": 1}))
+    old = Corpus(corpus.path)
+    assert [(info.twin_of, info.metadata) for info in old.info] == [("", {})] * 5
+    assert old.scene("scene-1").twin_of == ""
 
 
 def test_roads_are_stored_once(tmp_path):

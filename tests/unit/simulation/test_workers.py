@@ -14,6 +14,7 @@ from stylesim.corpus import files as corpus_files
 from stylesim.errors import CorpusError, InputError, SimulationError
 from stylesim.population import Population
 from stylesim.simulation import workers
+from stylesim.simulation.plan import PLAIN
 from stylesim.simulation.pool import raised
 from stylesim.simulation.workers import EpisodeRunner, Job, Task, failure, with_driver_counts
 from tests.conftest import make_scene
@@ -25,7 +26,7 @@ class MadeBackend:
 
     name = "made"
 
-    def run_episode(self, scenario, population, *, seed, episode):
+    def run_episode(self, scenario, population, *, seed, episode, plan=PLAIN):
         if episode == 13:
             raise SimulationError("no luck")
         return make_scene(f"{scenario.name}-{seed}-{episode:05d}", n_frames=20, n_agents=3)
