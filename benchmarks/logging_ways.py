@@ -68,7 +68,7 @@ def _raw(name: str) -> Any:
 
 
 def _recorder(sumo: Any) -> Step:
-    return Recorder(sumo, signal="centre", first_step=0).after_step
+    return Recorder(sumo, signals=("centre",), first_step=0).after_step
 
 
 def _subscriptions(sumo: Any) -> Step:

@@ -23,6 +23,8 @@ from stylesim.simulation.sumo.stopzone import StopZone
 from stylesim.simulation.sumo.yellow import YellowController
 from stylesim.style import STYLE_CLASSES
 
+LONGEST_WAIT_S = 120.0  # chosen: an ego that waits for its place has one by then; drawing more drivers slows a reset
+
 # By default SUMO reports a collision where the gap falls below minGap, although nobody has touched anybody.
 TOUCHING_ONLY = ("--collision.mingap-factor", "0")
 
@@ -30,18 +32,20 @@ TOUCHING_ONLY = ("--collision.mingap-factor", "0")
 class SumoCrowd:
     """Loads an episode into the engine and steps it; knows every driver's style and what it did at the light.
 
-    `extra_s` is how long after the scenario's own end drivers must still come in. Vehicles that the episode's files
-    do not know (an ego) take part in the traffic, and are left out of `rows` and `poses`. Drivers are numbered by
-    their time of entry; `style`, `knob`, `decision`, `ran_red` and `collided` hold one value for each of them.
+    `extra_s` is how long drivers must still come in after the scenario's own end, or after two minutes. Vehicles
+    that the episode's files do not know (an ego) take part in the traffic, and are left out of `rows` and `poses`.
+    Drivers are numbered by their time of entry; `style`, `knob`, `decision`, `ran_red` and `collided` hold one value
+    for each of them.
     """
 
     def __init__(
         self, engine: Engine, scenario: Scenario, population: Population, *, seed: int, extra_s: float
     ) -> None:
-        longer = scenario.model_copy(update={"duration_s": scenario.duration_s + extra_s})
+        until_s = min(scenario.duration_s, LONGEST_WAIT_S) + extra_s
+        longer = scenario.model_copy(update={"duration_s": until_s})
         with tempfile.TemporaryDirectory(prefix="stylesim-env-") as folder:
             self.files = prepare_episode(longer, population, seed=seed, episode=0, folder=Path(folder))
-            if self.files.options.signal is None:
+            if not self.files.signals:
                 raise InputError(f"scenario {scenario.name!r} has no traffic light; this environment needs one")
             engine.load([*sumo_options(self.files), *TOUCHING_ONLY])  # reads the files whole
         self._engine = engine
@@ -51,7 +55,7 @@ class SumoCrowd:
         self._wander = Wander(self.files)
         self._events_seen = 0
         self._step = 0
-        self._light = LightWatch(engine.sumo, self.files.network, self.files.options.signal.junction)
+        self._light = LightWatch(engine.sumo, self.files.network)
         drivers = self.files.drivers.values()
         self._number = {driver.driver_id: number for number, driver in enumerate(drivers)}
         self._size = np.array([(driver.length_m, driver.width_m) for driver in drivers]).reshape(-1, 2)
@@ -118,8 +122,8 @@ class SumoCrowd:
             self._poses = shifted(poses, *self._wander.advance(self.rows, speed))
         return self._poses
 
-    def light(self, link: int) -> tuple[SignalState, float]:
-        """What one link of the light is shown, and for how many seconds it has been."""
+    def light(self, link: tuple[str, int]) -> tuple[SignalState, float]:
+        """What one link (light, index) is shown, and for how many seconds it has been."""
         return self._light.shown_since(link)
 
     def lights(self) -> list[SignalState]:

@@ -31,7 +31,7 @@ class SumoEgo:
         self._travelled = 0.0
         self._reds = 0
         self._steps = 0
-        self._link: int | None = None  # of the light ahead
+        self._link: tuple[str, int] | None = None  # light and link ahead
         self._stop_line_m = np.inf
         self._directions: dict[str, tuple[list[float], list[float]]] = {}
         self._last = EgoState()
@@ -77,9 +77,9 @@ class SumoEgo:
     def _watch_light(self) -> None:
         """Follow the light ahead; one that was ahead and is not any more has been passed."""
         coming = self._sumo.vehicle.getNextTLS(EGO)
-        if self._link is not None and not coming:
+        if self._link is not None and (not coming or coming[0][0] != self._link[0]):
             self._reds += self._crowd.light(self._link)[0] is SignalState.RED
-        self._link = coming[0][1] if coming else None
+        self._link = (coming[0][0], coming[0][1]) if coming else None
         self._stop_line_m = float(coming[0][2]) if coming else np.inf
 
     def state(self, *, collided: bool) -> EgoState:

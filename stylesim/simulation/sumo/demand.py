@@ -13,6 +13,7 @@ from stylesim.randomness import stream
 from stylesim.scenario import Scenario
 from stylesim.simulation.sumo.options import Flow, SumoOptions
 from stylesim.simulation.sumo.roads import RoadNetwork
+from stylesim.simulation.sumo.signals import ONSET_S
 from stylesim.simulation.sumo.vehicles import Driver, draw_body, type_attributes
 from stylesim.styles import road_kind
 
@@ -69,7 +70,8 @@ def draw_drivers(
     parameters: Mapping[str, float],
 ) -> tuple[Driver, ...]:
     """Every driver of the episode by time of entry."""
-    arrivals = Arrivals(seed, episode, scenario.warm_up_s + scenario.duration_s, parameters)
+    until_s = scenario.warm_up_s + scenario.duration_s * options.last_entry_share
+    arrivals = Arrivals(seed, episode, until_s, parameters)
     drivers = [
         _driver(flow, number, time, population, arrivals)
         for flow in options.flows
@@ -92,7 +94,8 @@ def routes_xml(drivers: tuple[Driver, ...]) -> str:
     """The route file: a vehicle type and a vehicle for each driver."""
     lines = [ROUTES_HEAD]
     for driver in drivers:
-        attributes = " ".join(f'{key}="{value}"' for key, value in type_attributes(driver).items())
+        told = type_attributes(driver) | {"jmDriveAfterYellowTime": f"{ONSET_S:.2f}"}
+        attributes = " ".join(f'{key}="{value}"' for key, value in told.items())
         lines.append(f'<vType id="{driver.driver_id}" {attributes}/>')
         lines.append(
             f'<vehicle id="{driver.driver_id}" type="{driver.driver_id}" depart="{driver.depart_s:.1f}"'

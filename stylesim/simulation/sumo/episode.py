@@ -14,7 +14,7 @@ from stylesim.simulation.sumo.demand import check_routes, draw_drivers, routes_x
 from stylesim.simulation.sumo.network import compiled_network
 from stylesim.simulation.sumo.options import SumoOptions, sumo_options_of
 from stylesim.simulation.sumo.roads import RoadNetwork, read_network
-from stylesim.simulation.sumo.signals import programme_of
+from stylesim.simulation.sumo.signals import programme_of, programmes_xml
 from stylesim.simulation.sumo.vehicles import Driver
 
 DT_S = 0.1
@@ -26,7 +26,7 @@ class EpisodeFiles:
 
     network_path: Path
     route_path: Path
-    additional_path: Path | None  # the signal programme, where there is a signal
+    additional_path: Path | None  # the signal programmes, where the scenario has plans for signals
     drivers: Mapping[str, Driver]
     parameters: Mapping[str, float]
     network: RoadNetwork
@@ -35,6 +35,11 @@ class EpisodeFiles:
     episode: int
     warm_up_s: float
     duration_s: float
+
+    @property
+    def signals(self) -> tuple[str, ...]:
+        """The traffic lights of the network, sorted."""
+        return self.network.signals()
 
     @property
     def end_s(self) -> float:
@@ -58,11 +63,11 @@ def prepare_episode(
     routes = folder / "routes.rou.xml"
     routes.write_text(routes_xml(drivers), encoding="utf-8")
     additional = None
-    if options.signal is not None:
+    if options.signals:
         share = float(stream(seed, episode, "", "signal offset").random())
-        additional = folder / "signal.add.xml"
-        programme = programme_of(options.signal, network, parameters, offset_share=share)
-        additional.write_text(programme.xml(), encoding="utf-8")
+        additional = folder / "signals.add.xml"
+        programmes = [programme_of(plan, network, parameters, offset_share=share) for plan in options.signals]
+        additional.write_text(programmes_xml(programmes), encoding="utf-8")
     return EpisodeFiles(
         network_path=path,
         route_path=routes,

@@ -47,11 +47,23 @@ class Flow(Spec):
 
 
 class SignalPlan(Spec):
-    """A fixed-time signal: `groups` of entering edges get green one after the other."""
+    """A fixed-time signal: `groups` of movements get green one after the other.
+
+    A movement is an entering edge, or an edge with SUMO's letters of the directions meant: `west_in:sr`. The first
+    group gets `first_green_share` of the greens, the others share the rest by `weights` (equal ones by default).
+    """
 
     junction: str
-    groups: tuple[tuple[str, ...], ...] = Field(min_length=2, max_length=2)
-    left_turns: Literal["permissive", "protected"] = "permissive"
+    groups: tuple[tuple[str, ...], ...] = Field(min_length=2, max_length=8)
+    weights: tuple[float, ...] = ()
+    left_turns: Literal["permissive", "protected"] = "permissive"  # of movements without letters
+    wave_m: float = 0.0  # the cycle begins later than the episode's by this way at the speed limit (green wave)
+
+    @model_validator(mode="after")
+    def _weights(self) -> SignalPlan:
+        if self.weights and (len(self.weights) != len(self.groups) - 1 or min(self.weights) <= 0):
+            raise ValueError(f"weights needs {len(self.groups) - 1} positive numbers, one for each later group")
+        return self
 
 
 class SumoOptions(Spec):
@@ -60,7 +72,10 @@ class SumoOptions(Spec):
     network: NetworkFiles
     edge_types: dict[str, EdgeType]
     flows: tuple[Flow, ...] = Field(min_length=1)
-    signal: SignalPlan | None = None
+    signals: tuple[SignalPlan, ...] = ()
+    last_entry_share: float = Field(
+        default=1.0, gt=0, le=1
+    )  # of the logged time; who came later would be seen too short
 
     @model_validator(mode="after")
     def _shares(self) -> SumoOptions:
@@ -69,6 +84,8 @@ class SumoOptions(Spec):
             raise ValueError(f"the shares of the flows sum to {total:.6g}, not 1")
         if len({flow.name for flow in self.flows}) != len(self.flows):
             raise ValueError("two flows have the same name")
+        if len({plan.junction for plan in self.signals}) != len(self.signals):
+            raise ValueError("two signals have the same junction")
         return self
 
 
@@ -76,7 +93,7 @@ def sumo_options_of(scenario: Scenario) -> SumoOptions:
     """The checked options of a scenario; InputError naming the field, or the parameter that is missing or unknown."""
     where = scenario.folder / "scenario.yaml"
     options = parse(SumoOptions, scenario.options, f"{where}: options")
-    wanted = PARAMETERS + (SIGNAL_PARAMETERS if options.signal else ())
+    wanted = PARAMETERS + (SIGNAL_PARAMETERS if options.signals else ())
     for name in scenario.parameters:
         if name not in wanted:
             raise unknown("parameter", name, wanted, where=where)

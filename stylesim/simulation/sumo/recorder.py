@@ -5,7 +5,7 @@ docs/logging.md says what was measured and why it is done this way.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from itertools import chain
 
@@ -15,6 +15,14 @@ from jaxtyping import Float64, Int32
 from stylesim.simulation.sumo.engine import SumoApi
 
 FLUSH_STEPS = 400  # Python tuples of so many steps are held at most, to bound memory
+
+
+@dataclass(frozen=True, eq=False)
+class SignalTexts:
+    """What one signal showed: the distinct state strings, and which one in every step."""
+
+    texts: tuple[str, ...]
+    shown: Int32[np.ndarray, " step"]
 
 
 @dataclass(frozen=True, eq=False)
@@ -32,8 +40,7 @@ class RawLog:
     step: Int32[np.ndarray, " row"]
     front_m: Float64[np.ndarray, "row 2"]
     lateral_m: Float64[np.ndarray, " row"]
-    signal_texts: tuple[str, ...]
-    signal_shown: Int32[np.ndarray, " step"]
+    signals: Mapping[str, SignalTexts]
     collisions: tuple[tuple[int, str, str], ...]
     emergency_stops: tuple[tuple[int, str], ...]
     teleports: tuple[tuple[int, str], ...]
@@ -51,8 +58,8 @@ class _Events:
 class Recorder:
     """Call `after_step` after every step of an episode; rows are kept from `first_step` on."""
 
-    def __init__(self, sumo: SumoApi, *, signal: str, first_step: int) -> None:
-        self._sumo, self._signal, self._first = sumo, signal, first_step
+    def __init__(self, sumo: SumoApi, *, signals: Sequence[str], first_step: int) -> None:
+        self._sumo, self._first = sumo, first_step
         self._number: dict[str, int] = {}
         self._depart: list[int] = []
         self._here: dict[str, int] = {}
@@ -64,17 +71,17 @@ class Recorder:
         self._fronts: list[Sequence[tuple[float, float]]] = []
         self._laterals: list[list[float]] = []
         self._blocks: list[tuple[np.ndarray, np.ndarray]] = []
-        self._texts: dict[str, int] = {}
-        self._shown: list[int] = []
+        self._texts: dict[str, dict[str, int]] = {name: {} for name in signals}
+        self._shown: dict[str, list[int]] = {name: [] for name in signals}
         self._events = _Events()
 
     def after_step(self, step: int) -> None:
         """Takes what the step brought."""
         self._follow_traffic(step)
         self._follow_events(step)
-        if self._signal:
-            text = self._sumo.trafficlight.getRedYellowGreenState(self._signal)
-            self._shown.append(self._texts.setdefault(text, len(self._texts)))
+        for name, texts in self._texts.items():
+            text = self._sumo.trafficlight.getRedYellowGreenState(name)
+            self._shown[name].append(texts.setdefault(text, len(texts)))
         if step < self._first or not self._ids:
             return
         vehicle = self._sumo.vehicle
@@ -143,8 +150,10 @@ class Recorder:
             step=np.repeat(np.array([step for step, _ in self._rows], np.int32), counts),
             front_m=np.concatenate([front for front, _ in self._blocks]),
             lateral_m=np.concatenate([lateral for _, lateral in self._blocks]),
-            signal_texts=tuple(self._texts),
-            signal_shown=np.array(self._shown, np.int32),
+            signals={
+                name: SignalTexts(tuple(texts), np.array(self._shown[name], np.int32))
+                for name, texts in self._texts.items()
+            },
             collisions=tuple(self._events.collisions),
             emergency_stops=tuple(self._events.emergency_stops),
             teleports=tuple(self._events.teleports),

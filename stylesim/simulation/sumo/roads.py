@@ -34,6 +34,10 @@ class RoadNetwork:
     length_m: dict[str, float]  # of each lane, as SUMO counts it
     edges: tuple[str, ...]  # those between junctions
 
+    def signals(self) -> tuple[str, ...]:
+        """The ids of its signals, sorted."""
+        return tuple(sorted({link.signal for link in self.links}))
+
     def controlled_lanes(self) -> tuple[str, ...]:
         """The lanes that end at a signal, sorted."""
         return tuple(sorted({link.lane for link in self.links}))

@@ -47,9 +47,8 @@ class SumoBackend:
         """Steps through a prepared episode; what was logged and what was decided at yellow lights."""
         engine = self._engine
         engine.load(sumo_options(files))
-        plan = files.options.signal
         first = max(0, round((files.warm_up_s - LEAD_S) / DT_S))
-        recorder = Recorder(engine.sumo, signal=plan.junction if plan else "", first_step=first)
+        recorder = Recorder(engine.sumo, signals=files.signals, first_step=first)
         yellow, zone = YellowController(engine.sumo, files), StopZone(engine.sumo, files)
         for step in range(round(files.end_s / DT_S)):
             yellow.before_step(step)

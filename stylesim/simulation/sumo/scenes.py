@@ -42,10 +42,8 @@ def scene_of(log: RawLog, decisions: list[DecisionEvent], files: EpisodeFiles, *
 
 
 def _signals(log: RawLog, files: EpisodeFiles, *, start: int, frames: int) -> Signals | None:
-    if files.options.signal is None:
-        return None
-    shown = log.signal_shown[start : start + frames]
-    return signal_log(files.network, {files.options.signal.junction: (log.signal_texts, shown)})
+    shown = {name: (log.texts, log.shown[start : start + frames]) for name, log in log.signals.items()}
+    return signal_log(files.network, shown)
 
 
 def _tracks(

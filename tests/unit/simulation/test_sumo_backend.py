@@ -57,7 +57,7 @@ def test_lights_show_the_drawn_yellow_and_all_red(scenes: list[Scene]) -> None:
 def test_decisions_come_at_the_onset_and_have_consequences(backend: SumoBackend, tmp_path: Path) -> None:
     files = prepare_episode(YELLOW, SPECTRUM, seed=7, episode=0, folder=tmp_path)
     log, events = backend.simulate(files)
-    texts = [log.signal_texts[index] for index in log.signal_shown]
+    texts = [log.signals["centre"].texts[index] for index in log.signals["centre"].shown]
     assert events
     for event in events:
         assert "y" in texts[event.step]
