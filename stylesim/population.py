@@ -14,7 +14,7 @@ from stylesim.errors import InputError, unknown
 from stylesim.resources import agents_dir
 from stylesim.specs import Spec, load_yaml
 from stylesim.style import CLASS_INTERVAL, CLASS_KNOB, STYLE_CLASSES, DriverStyle
-from stylesim.styles import OTHER, load_calibration, style_table
+from stylesim.styles import load_calibration, style_table
 
 SHARE_TOLERANCE = 1e-6
 
@@ -111,10 +111,10 @@ class Population:
         load_calibration(Path(path).absolute())
         return replace(self, calibration=str(Path(path).absolute()))
 
-    def draw(self, rng: np.random.Generator, *, backend: str = "", road: str = OTHER) -> DriverStyle:
+    def draw(self, rng: np.random.Generator, *, backend: str = "", limit_mps: float | None = None) -> DriverStyle:
         """One driver: class by share, place on the knob within the class, then individual variation.
 
-        `backend` chooses the calibrated parameters, `road` those of the kind of road (`styles.road_kind`) it enters by.
+        `backend` chooses the calibrated parameters, the limit of the road that it enters by those of that kind of road.
         """
         table = style_table(backend, calibration=Path(self.calibration) if self.calibration else None)
         if self.within_class == "neutral":
@@ -122,7 +122,7 @@ class Population:
         name = STYLE_CLASSES[int(rng.choice(len(self.shares), p=np.array(self.shares) / sum(self.shares)))]
         low, high = CLASS_INTERVAL[name]
         knob = CLASS_KNOB[name] if self.within_class == "centre" else float(rng.uniform(low, high))
-        return table.at(knob, rng, road=road)
+        return table.at(knob, rng, limit_mps=limit_mps)
 
 
 def populations() -> tuple[str, ...]:

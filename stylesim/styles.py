@@ -22,6 +22,7 @@ from stylesim.style import CLASS_INTERVAL, CLASS_KNOB, PHYSICAL_FIELDS, STYLE_CL
 MOTORWAY, OTHER = "motorway", "other"  # kinds of road: people drive differently where they cannot meet a junction
 MOTORWAY_LIMIT_MPS = 80 / 3.6  # REFERENCE section 1: a highway has a limit of 80 km/h or more [ours]
 LIMIT_TOLERANCE_MPS = 0.05  # limits are stored as float32 and some maps round to 0.1 m/s
+COMFORT = "comfortable_speed_mps"  # only in calibrations: drivers who do not go faster, however high the limit
 DECIMALS = 4  # of a drawn parameter: finer than anything that a driver could mean, and it stores in half the bytes
 
 
@@ -49,6 +50,10 @@ class ClassRange(Spec):
     bold: float
     spread: float = Field(default=0.0, ge=0.0, le=0.5)  # sd of the log factor between drivers at one place of the knob
 
+    def at(self, aggressiveness: float, name: str) -> float:
+        """The value at that place of the knob, within the stretch of the class `name`."""
+        return float(np.interp(aggressiveness, CLASS_INTERVAL[name], (self.calm, self.bold)))
+
 
 Ranges = dict[str, dict[str, ClassRange]]  # parameter -> class -> range
 
@@ -60,22 +65,26 @@ class StyleTable(Spec):
     parameters: dict[str, StyleParameter]
     calibrated: dict[str, Ranges] = Field(default_factory=dict)  # by kind of road
 
-    def at(self, aggressiveness: float, rng: np.random.Generator | None = None, *, road: str = OTHER) -> DriverStyle:
-        """The driver at that place of the knob; 0 is the neutral one.
+    def at(
+        self, aggressiveness: float, rng: np.random.Generator | None = None, *, limit_mps: float | None = None
+    ) -> DriverStyle:
+        """The driver at that place of the knob, entering by a road of that limit; 0 is the neutral one.
 
         Where nothing is calibrated for that kind of road, a parameter is interpolated linearly between the classes and
         neutral; where something is, between the two ends of the class's own range. With `rng`, each parameter is
         multiplied by a log-normal factor of its spread (people of one style differ), then clipped to its limits.
-        ValueError outside [-1, 1].
+        The wished speed is no higher than the class's comfortable one, whatever the limit. ValueError outside [-1, 1].
         """
         name = class_of_knob(aggressiveness)
-        ranges = self.calibrated.get(road, {}) if aggressiveness != 0.0 else {}
+        ranges = self.calibrated.get(road_kind(limit_mps), {}) if aggressiveness != 0.0 else {}
         values: dict[str, float] = {}
         for key in PHYSICAL_FIELDS:
             parameter = self.parameters[key]
             if key in ranges:
                 own = ranges[key][name]
-                value, spread = float(np.interp(aggressiveness, CLASS_INTERVAL[name], (own.calm, own.bold))), own.spread
+                value, spread = own.at(aggressiveness, name), own.spread
+                if key == "desired_speed_factor" and limit_mps is not None and COMFORT in ranges:
+                    value = min(value, ranges[COMFORT][name].at(aggressiveness, name) / limit_mps)
             else:
                 value, spread = _between_classes(parameter, aggressiveness), parameter.spread
             if rng is not None:
@@ -119,8 +128,8 @@ def load_calibration(path: Path) -> Calibration:
     found = load_yaml(Calibration, path)
     for road, ranges in found.roads.items():
         for key, classes in ranges.items():
-            if key not in PHYSICAL_FIELDS:
-                raise unknown("driver parameter", key, PHYSICAL_FIELDS, where=path)
+            if key not in (*PHYSICAL_FIELDS, COMFORT):
+                raise unknown("driver parameter", key, (*PHYSICAL_FIELDS, COMFORT), where=path)
             if set(classes) != set(STYLE_CLASSES):
                 raise InputError(f"{path}: roads.{road}.{key} must name each of {', '.join(STYLE_CLASSES)}")
     return found

@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 from stylesim.errors import InputError
 from stylesim.population import Population, populations
 from stylesim.style import CLASS_INTERVAL, CLASS_KNOB, PHYSICAL_FIELDS, STYLE_CLASSES, class_of_knob
-from stylesim.styles import MOTORWAY, load_calibration, road_kind, style_table
+from stylesim.styles import load_calibration, road_kind, style_table
 
 
 def test_every_class_sits_at_its_place_of_the_knob():
@@ -123,17 +123,27 @@ def calibrated(tmp_path, text=CALIBRATED):
 
 def test_a_calibrated_class_has_its_own_range_up_to_its_border(tmp_path):
     table = style_table("sumo", calibration=calibrated(tmp_path))
-    assert table.at(0.801, road=MOTORWAY).lane_wander_m == pytest.approx(0.4005)
-    assert table.at(1.0, road=MOTORWAY).lane_wander_m == 0.5
-    assert table.at(0.799, road=MOTORWAY).lane_wander_m == 0.6  # reckless begins here
-    assert table.at(0.0, road=MOTORWAY) == style_table().at(0.0)  # neutral stays the anchor
+    assert table.at(0.801, limit_mps=30.0).lane_wander_m == pytest.approx(0.4005)
+    assert table.at(1.0, limit_mps=30.0).lane_wander_m == 0.5
+    assert table.at(0.799, limit_mps=30.0).lane_wander_m == 0.6  # reckless begins here
+    assert table.at(0.0, limit_mps=30.0) == style_table().at(0.0)  # neutral stays the anchor
     assert table.at(0.9) == style_table().at(0.9)  # nothing was calibrated for other roads
+
+
+def test_nobody_wishes_to_go_faster_than_is_comfortable(tmp_path):
+    speeds = "".join(
+        f"    {key}:\n" + "".join(f"      {name}: {{calm: {v}, bold: {v}}}\n" for name in STYLE_CLASSES)
+        for key, v in (("desired_speed_factor", 1.1), ("comfortable_speed_mps", 30.0))
+    )
+    table = style_table("sumo", calibration=calibrated(tmp_path, CALIBRATED + speeds))
+    assert table.at(0.5, limit_mps=25.0).desired_speed_factor == pytest.approx(1.1)
+    assert table.at(0.5, limit_mps=40.0).desired_speed_factor == pytest.approx(0.75)
 
 
 def test_a_population_drives_by_the_calibration_that_it_is_given(tmp_path):
     crowd = Population.of(aggressive=1.0).calibrated(calibrated(tmp_path))
     rng = np.random.default_rng(0)
-    drawn = [crowd.draw(rng, backend="sumo", road=MOTORWAY).lane_wander_m for _ in range(50)]
+    drawn = [crowd.draw(rng, backend="sumo", limit_mps=30.0).lane_wander_m for _ in range(50)]
     assert 0.4 <= min(drawn) < max(drawn) <= 0.5
     with pytest.raises(InputError, match="calibrated for 'sumo'"):
         crowd.draw(rng, backend="highway")

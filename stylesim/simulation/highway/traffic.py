@@ -16,7 +16,6 @@ from stylesim.simulation.highway.right_of_way import RightOfWay
 from stylesim.simulation.highway.road import StyledRegulatedRoad, StyledRoad
 from stylesim.simulation.highway.spec import HighwayOptions
 from stylesim.simulation.highway.vehicle import TOP_SPEED_MPS, StyledVehicle
-from stylesim.styles import road_kind
 
 RUN_UP_M = 100.0  # road behind the last car at the start
 SPAWN_EVERY_S = 1.0  # highway-env's intersection clears and spawns once per decision of 1 s
@@ -42,8 +41,8 @@ class Crew:
             return
         driver_id = f"car-{self._hired:04d}"
         self._hired += 1
-        road = road_kind(vehicle.lane.speed_limit)
-        style = self._population.draw(stream(*self._key, driver_id, "style"), backend="highway", road=road)
+        limit = vehicle.lane.speed_limit
+        style = self._population.draw(stream(*self._key, driver_id, "style"), backend="highway", limit_mps=limit)
         pedal, lane = stream(*self._key, driver_id, "pedal"), stream(*self._key, driver_id, "lane wander")
         vehicle.adopt(style, driver_id=driver_id, pedal=pedal, lane=lane)
 

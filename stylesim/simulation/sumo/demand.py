@@ -15,7 +15,6 @@ from stylesim.simulation.sumo.options import Flow, SumoOptions
 from stylesim.simulation.sumo.roads import RoadNetwork
 from stylesim.simulation.sumo.signals import ONSET_S
 from stylesim.simulation.sumo.vehicles import Driver, draw_body, type_attributes
-from stylesim.styles import road_kind
 
 SHORTEST_HEADWAY_S = 0.5  # between entries of one flow; chosen, because two lanes at 1 s each can be entered that fast
 ROUTES_HEAD = (
@@ -55,8 +54,8 @@ def _driver(flow: Flow, number: int, depart_s: float, population: Population, ar
     body = stream(seed, episode, name, "body")
     truck = bool(body.random() < arrivals.parameters["truck_share"]) and flow.trucks
     kind, length, width = draw_body(truck=truck, rng=body)
-    road = road_kind(arrivals.parameters.get("speed_limit_mps"))
-    style = population.draw(stream(seed, episode, name, "style"), backend="sumo", road=road)
+    limit = arrivals.parameters.get("speed_limit_mps")
+    style = population.draw(stream(seed, episode, name, "style"), backend="sumo", limit_mps=limit)
     return Driver(name, style, kind, length, width, depart_s, f"{flow.enter} {way}")
 
 
