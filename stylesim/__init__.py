@@ -33,6 +33,7 @@ _HOME = {
     "WindowSpec": "stylesim.windows",
     "balance": "stylesim.merging.balance",
     "evaluate": "stylesim.report.evaluate",
+    "fidelity": "stylesim.evaluation.fidelity",
     "generate": "stylesim.simulation.generate",
     "label": "stylesim.labelers.labelling",
     "load_forecaster": "stylesim.forecasting.checkpoint",

@@ -7,7 +7,7 @@ too narrow: a percentile bootstrap cannot see variation between units that it ha
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import Any, Literal
 
@@ -101,6 +101,28 @@ def bootstrap_means(
         sums = np.add.reduceat(sorted_value[pick], np.concatenate([[0], np.cumsum(total)[:-1]]))
         means[start : start + count] = sums / total
     return means
+
+
+def bootstrap_weights(
+    group: Int64[np.ndarray, " driver"], rng: np.random.Generator, draws: int
+) -> Iterator[Float64[np.ndarray, "draw driver"]]:
+    """How often each driver is in each of `draws` resamples (groups, then drivers within), in blocks of draws.
+
+    For statistics that are no mean; `bootstrap_means` draws in the same manner.
+    """
+    order = np.argsort(group, kind="stable")
+    size = np.unique(group, return_counts=True)[1]
+    first = np.concatenate([[0], np.cumsum(size)[:-1]])
+    n = len(group)
+    step = max(1, BLOCK // max(n, 1))
+    for start in range(0, draws, step):
+        count = min(step, draws - start)
+        chosen = rng.integers(len(size), size=(count, len(size)))
+        length = size[chosen]
+        owner = np.repeat(chosen.ravel(), length.ravel())
+        pick = order[first[owner] + (rng.random(len(owner)) * size[owner]).astype(np.int64)]
+        draw = np.repeat(np.arange(count), length.sum(axis=1))
+        yield np.bincount(draw * n + pick, minlength=count * n).reshape(count, n).astype(np.float64)
 
 
 def _constant_interval(value: float, n: int, rate: bool) -> tuple[float, float]:

@@ -61,20 +61,25 @@ def track_rows(
     Only full windows count; a driver without one is judged by what it has and flagged SHORT. `agents` None: every
     motor vehicle that was seen. The length defaults to `options.window_s`.
     """
-    dt_s = scene.tracks.dt_s
-    steps = max(1, round(options.window_s / dt_s)) if length_steps is None else length_steps
+    steps = max(1, round(options.window_s / scene.tracks.dt_s)) if length_steps is None else length_steps
     if starts is None:
         windows = tiled_features(scene, steps, options)
     else:
         windows = _side_by_side([window_features(scene, start, steps, options) for start in starts])
     if agents is None:
         agents = np.flatnonzero(scene.tracks.is_motor & scene.tracks.valid.any(axis=1))
+    return averaged(scene, windows, agents)
+
+
+def averaged(scene: Scene, windows: WindowFeatures, agents: Int[np.ndarray, " driver"]) -> DriverRows:
+    """The mean of each chosen driver's windows, one row per driver."""
+    dt_s = scene.tracks.dt_s
     valid = scene.tracks.valid[agents]
     value, flags = _average(windows.at(agents[:, None], np.arange(windows.frames.shape[1])[None]), dt_s)
     flags[scene.tracks.flagged(TrackFlag.IMPLAUSIBLE)[agents]] |= LabelFlag.IMPLAUSIBLE
     return DriverRows(
         span="track",
-        length_s=steps * dt_s,
+        length_s=windows.length_steps * dt_s,
         scene_id=(scene.scene_id,) * len(agents),
         agent_id=tuple(scene.tracks.agent_id[i] for i in agents),
         start_frame=valid.argmax(axis=1).astype(np.int32),

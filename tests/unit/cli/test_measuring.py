@@ -1,0 +1,22 @@
+"""The verbs that measure, as a user meets them."""
+
+from __future__ import annotations
+
+import json
+
+from stylesim.corpus import CorpusWriter
+from tests.conftest import make_scene
+
+
+def test_fidelity_of_a_corpus_and_a_wrong_ending(stylesim, tmp_path):
+    path = tmp_path / "sim"
+    with CorpusWriter(path, source="made", configuration={}, seed=1) as writer:
+        for i in range(6):
+            writer.add(make_scene(f"s{i}", n_agents=9, n_frames=230, seed=i, source="sumo"))
+        writer.finish()
+    wrong = stylesim("fidelity", path, "--out", tmp_path / "f.csv")
+    assert wrong.code == 2 and ".json" in wrong.err
+    said = stylesim("fidelity", path, "--no-robustness", "--out", tmp_path / "f.json")
+    assert said.code == 0
+    assert "balanced" in said.out and "Who is not judged" in said.out
+    assert json.loads((tmp_path / "f.json").read_text())["format"] == "stylesim-fidelity"
