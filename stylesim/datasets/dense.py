@@ -15,6 +15,7 @@ from stylesim.geometry import wrap_angle
 from stylesim.tracks import AgentKind, Tracks
 
 MAX_DISTANCE_M = 20_000.0  # chosen: farther from the scene's origin nothing is in view of one vehicle or drone
+MAX_COORDINATE_M = 1e8  # chosen: more than once round the earth is no coordinate in metres
 MAX_LOST_SHARE = 0.5  # chosen: a file that loses more of its rows than this is of other units, or damaged as a whole
 CAR_LENGTH_M = (2.5, 8.0)  # the median of a site's cars is 4 to 5 m; feet would give 15, decimetres 45, metres/feet 1.4
 MIN_CARS = 5  # chosen: fewer cars do not prove that a unit is wrong
@@ -97,7 +98,7 @@ def refuse_other_units(tracks: Tracks, file: Path) -> None:
     meant = (speed[:, 1:] + speed[:, :-1]) / 2
     with np.errstate(invalid="ignore"):
         moving = tracks.is_motor[:, None] & ((meant > MOVING_MPS) | (moved > MOVING_MPS))
-        moving &= tracks.valid[:, 1:] & tracks.valid[:, :-1] & (moved < MAX_SPEED_MPS)
+        moving &= tracks.valid[:, 1:] & tracks.valid[:, :-1]
     if moving.sum() < MIN_ROWS:
         return
     ratio = float(np.median(moved[moving] / np.maximum(meant[moving], 1e-3)))
@@ -113,3 +114,30 @@ def refuse_other_units(tracks: Tracks, file: Path) -> None:
             f"{file}: headings are {np.degrees(error):.0f} degrees off the direction of motion; "
             "they must be counter-clockwise from east"
         )
+
+
+def origin_of(position_m: Float[np.ndarray, "agent time 2"], valid: Bool[np.ndarray, "agent time"]) -> np.ndarray:
+    """A whole-metre point amid the agents of the first frame that has any: what comes later moves nothing."""
+    there = valid & np.isfinite(position_m).all(-1) & (np.abs(position_m) < MAX_COORDINATE_M).all(-1)
+    if not there.any():
+        return np.zeros(2)
+    first = int(there.any(axis=0).argmax())
+    return np.round(np.median(position_m[there[:, first], first].astype(np.float64), axis=0))
+
+
+def size_when_seen(
+    size_m: Float[np.ndarray, "agent time 2"], valid: Bool[np.ndarray, "agent time"], t0: int
+) -> np.ndarray:
+    """One size per agent where the source measures it anew in each frame, not knowing what comes after t0.
+
+    The median over the frames up to t0 in which it was seen; of an agent that appears later, its first one.
+    """
+    result = np.full((len(size_m), 2), np.nan)
+    early = valid.copy()
+    early[:, t0 + 1 :] = False
+    for agent in range(len(size_m)):
+        if early[agent].any():
+            result[agent] = np.median(size_m[agent, early[agent]], axis=0)
+        elif valid[agent].any():
+            result[agent] = size_m[agent, int(valid[agent].argmax())]
+    return result

@@ -49,7 +49,8 @@ def hold(name, path):
                 steps += int(scene.tracks.valid.sum())
                 _sound(scene.tracks)
     except StylesimError as error:
-        return "refused" if len(str(error)) > 20 else f"an error without words: {error}"
+        told = len(str(error)) > 20 and "TypeCheckError" not in str(error)  # the tests' own type checker: a defect
+        return "refused" if told else f"an error without words: {error}"
     checked(total, steps=steps, where=name)
     return "read"
 

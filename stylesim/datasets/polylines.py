@@ -1,0 +1,57 @@
+"""Polylines of foreign maps: checked, without repeated points, in metres from a scene's origin."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from jaxtyping import Float, Float32, Float64
+
+from stylesim.geometry import project
+
+# Chosen: no map of these formats reaches farther than a city; a point beyond is damaged, or in other units.
+MAX_MAP_M = 100_000.0
+NOMINAL_WIDTH_M = 3.5  # chosen, common lane width: only for the length of a stop line that is given as a point
+
+
+def map_line(points: Any, origin_m: Float64[np.ndarray, " 2"]) -> Float32[np.ndarray, "point 2"]:
+    """The first two coordinates of `points` ([point, 2 or 3], in the source's frame), repeated points left out.
+
+    ValueError where a point is not finite or too far away.
+    """
+    array = np.asarray(points, np.float64)
+    if array.ndim != 2 or array.shape[1] < 2:
+        raise ValueError(f"a line has the shape {array.shape}, not (points, 2 or 3)")
+    array = array[:, :2] - origin_m
+    if not (np.abs(array) <= MAX_MAP_M).all():  # not-a-number fails too
+        raise ValueError("a point of the map is not finite or too far away")
+    apart = np.ones(len(array), bool)
+    apart[1:] = np.hypot(*np.diff(array, axis=0).T) > 1e-6
+    return array[apart].astype(np.float32)
+
+
+def stop_line_at(
+    point_m: Float[np.ndarray, " 2"], line_m: Float32[np.ndarray, "point 2"], width_m: float
+) -> Float64[np.ndarray, "2 2"]:
+    """A line across the lane through the foot of `point_m` on its centre line, from its right to its left."""
+    _, _, _, segment = project(point_m[None].astype(np.float64), line_m)
+    at = int(segment[0])
+    start = line_m[at].astype(np.float64)
+    direction = line_m[at + 1] - start
+    direction /= max(float(np.hypot(*direction)), 1e-9)
+    foot = start + float((point_m - start) @ direction) * direction
+    left = np.array([-direction[1], direction[0]]) * (width_m if width_m > 0 else NOMINAL_WIDTH_M) / 2
+    return np.stack([foot - left, foot + left])
+
+
+def nearest_points(
+    places_m: Float64[np.ndarray, "place 2"], line_m: Float32[np.ndarray, "point 2"]
+) -> Float64[np.ndarray, "place 2"]:
+    """The foot of each place on a line."""
+    line = line_m.astype(np.float64)
+    along, _, _, segment = project(places_m, line_m)
+    step = np.diff(line, axis=0)
+    length = np.hypot(step[:, 0], step[:, 1])
+    start = np.concatenate([[0.0], np.cumsum(length)])[segment]
+    share = (along - start) / np.maximum(length[segment], 1e-12)
+    return line[segment] + share[:, None] * step[segment]

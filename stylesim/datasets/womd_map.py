@@ -1,0 +1,72 @@
+"""The map of a `Scenario` proto (waymo_open_dataset/protos/map.proto)."""
+
+from __future__ import annotations
+
+import numpy as np
+from jaxtyping import Float64
+
+from stylesim.datasets import wire
+from stylesim.datasets.polyline_map import MPH, PolylineLane, PolylineMap, Stretch
+
+_LANE, _LINE, _EDGE, _CROSSWALK = 3, 4, 5, 8  # MapFeature.feature_data; signs, bumps and driveways are left out
+BIKE_LANE = 3  # LaneCenter.LaneType: a bicycle lane would be the nearest "lane" of many a car beside it
+
+# A MapPoint in which x, y and z are there, in order.
+_POINT = np.dtype([("x_tag", "u1"), ("x", "<f8"), ("y_tag", "u1"), ("y", "<f8"), ("z_tag", "u1"), ("z", "<f8")])
+
+
+def map_of(data: bytes, features: list[wire.Span]) -> PolylineMap:
+    """Lanes for motor traffic, their boundaries, and crosswalks, in the source's frame."""
+    result = PolylineMap()
+    for span in features:
+        feature = wire.fields(data, span)
+        key = str(wire.integer(feature, 1))
+        if _LANE in feature:
+            lane = _lane(data, key, wire.fields(data, wire.spans(feature, _LANE)[-1]))
+            if lane is not None:
+                result.lanes.append(lane)
+        elif _LINE in feature or _EDGE in feature:
+            line = wire.fields(data, wire.spans(feature, _LINE if _LINE in feature else _EDGE)[-1])
+            result.lines[key] = points(data, wire.spans(line, 2))
+        elif _CROSSWALK in feature:
+            walk = wire.fields(data, wire.spans(feature, _CROSSWALK)[-1])
+            result.crosswalks.append(points(data, wire.spans(walk, 1)))
+    ids = [lane.lane_id for lane in result.lanes]
+    if len(set(ids)) != len(ids):
+        raise ValueError("two lanes have one id")
+    return result
+
+
+def points(data: bytes, found: list[wire.Span]) -> Float64[np.ndarray, "point 2"]:
+    """The x and y of MapPoints."""
+    rows, same = wire.fixed(data, found, _POINT)
+    regular = (rows["x_tag"] == 0x09) & (rows["y_tag"] == 0x11) & (rows["z_tag"] == 0x19)
+    same[same] = regular
+    result = np.full((len(found), 2), np.nan)
+    result[same] = np.stack([rows["x"][regular], rows["y"][regular]], -1)
+    for i in np.flatnonzero(~same).tolist():
+        point = wire.fields(data, found[i])
+        result[i] = wire.real(data, point, 1, 0.0), wire.real(data, point, 2, 0.0)  # proto2: missing is 0
+    return result
+
+
+def _lane(data: bytes, lane_id: str, lane: wire.Fields) -> PolylineLane | None:
+    if wire.integer(lane, 2) == BIKE_LANE:
+        return None
+    line = points(data, wire.spans(lane, 8))
+    return PolylineLane(
+        lane_id=lane_id,
+        points=line,
+        speed_limit_mps=wire.real(data, lane, 1) * MPH,
+        successors=[str(i) for i in wire.integers(data, lane, 10).tolist()],
+        left_boundaries=_stretches(data, lane, 13, feature=3, start=1, end=2),
+        right_boundaries=_stretches(data, lane, 14, feature=3, start=1, end=2),
+        left_neighbours=_stretches(data, lane, 11, feature=1, start=2, end=3),
+        right_neighbours=_stretches(data, lane, 12, feature=1, start=2, end=3),
+        in_junction=bool(wire.integer(lane, 3)),  # "interpolating": it joins two lanes
+    )
+
+
+def _stretches(data: bytes, lane: wire.Fields, number: int, *, feature: int, start: int, end: int) -> list[Stretch]:
+    found = [wire.fields(data, span) for span in wire.spans(lane, number)]
+    return [(str(wire.integer(f, feature)), wire.integer(f, start), wire.integer(f, end)) for f in found]
