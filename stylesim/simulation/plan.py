@@ -34,6 +34,7 @@ class Twin(Spec):
     name: str = Field(pattern=r"^[a-z_]{1,16}$")  # of the variant; the scene's id ends in it
     driver: str
     style: DriverStyle
+    from_style: str  # the class that it has in the episode
     at_s: float | None = Field(default=None, ge=0.0)
     new_noise: bool = False
 
@@ -78,12 +79,10 @@ class EpisodePlan(Spec):
         if self.twin is None:
             return scene
         twin = self.twin
-        number = scene.tracks.agent_id.index(twin.driver) if twin.driver in scene.tracks.agent_id else -1
-        before = scene.tracks.driver[number] if number >= 0 else None
         about = {
             "variant": twin.name,
             "driver": twin.driver,
-            "from_style": None if before is None else before.name,
+            "from_style": twin.from_style,
             "to_style": twin.style.name,
             "at_s": twin.at_s,
             "new_noise": twin.new_noise,

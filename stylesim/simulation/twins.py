@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
 from stylesim.population import Population
@@ -9,6 +11,7 @@ from stylesim.randomness import stream
 from stylesim.scene import Scene
 from stylesim.simulation.plan import Twin, TwinRequest
 from stylesim.style import STYLE_CLASSES
+from stylesim.styles import road_kind
 
 LEAST_AHEAD_S = (
     5.0  # chosen, because a change of style takes seconds to show (a headway, a lane change) and must be seen
@@ -38,8 +41,12 @@ def candidates(scene: Scene, request: TwinRequest) -> tuple[int, ...]:
     )
 
 
-def twins_of(scene: Scene, request: TwinRequest, *, seed: int, episode: int) -> tuple[Twin, ...]:
+def twins_of(
+    scene: Scene, request: TwinRequest, population: Population, *, backend: str, seed: int, episode: int
+) -> tuple[Twin, ...]:
     """The twins to simulate beside the episode `scene`; none where it has no candidate.
+
+    The new style is that of a person of the wanted class as `population` has them on `backend`.
 
     Driver, class and style come from streams of their own, so that they shift nothing else.
     """
@@ -52,8 +59,8 @@ def twins_of(scene: Scene, request: TwinRequest, *, seed: int, episode: int) -> 
     rng = stream(seed, episode, driver_id, "twin style")
     others = [name for name in STYLE_CLASSES if name != own.name]
     name = request.style or others[int(rng.integers(len(others)))]
-    style = Population.of(**{name: 1.0}).draw(rng)
-    made = [Twin(name=TWIN, driver=driver_id, style=style, at_s=request.at_s)]
-    if request.null:
-        made.append(Twin(name=NULL, driver=driver_id, style=own, at_s=request.at_s, new_noise=True))
-    return tuple(made)
+    crowd = replace(population.reweighted(**{name: 1.0}), within_class="interval")
+    style = crowd.draw(rng, backend=backend, road=road_kind(scene.parameters.get("speed_limit_mps")))
+    twin = Twin(name=TWIN, driver=driver_id, style=style, from_style=own.name, at_s=request.at_s)
+    null = twin.model_copy(update={"name": NULL, "style": own, "new_noise": True})
+    return (twin, null) if request.null else (twin,)

@@ -9,6 +9,7 @@ stands still with the vehicle, so that nobody slides sideways.
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 
 import numpy as np
 from jaxtyping import Float64
@@ -29,6 +30,16 @@ def filter_gain(correlation_time_s: Float64[np.ndarray, " agent"]) -> Float64[np
     return np.asarray(np.sqrt((r + r**2) / 2.0))
 
 
+@dataclass(frozen=True)
+class WanderSwitch:
+    """From `frame` on one agent wanders as another style, and with `stream` (where given) from other draws."""
+
+    agent: int
+    frame: int
+    style: DriverStyle
+    stream: np.random.Generator | None = None
+
+
 def lateral_wander(
     styles: Sequence[DriverStyle],
     speed_mps: Float64[np.ndarray, "agent time"],
@@ -36,6 +47,7 @@ def lateral_wander(
     limit_m: Float64[np.ndarray, " agent"],
     dt_s: float,
     streams: Sequence[np.random.Generator],
+    switch: WanderSwitch | None = None,
 ) -> Float64[np.ndarray, "agent time"]:
     """The offset to the left of the path, m, for every driver and frame.
 
@@ -53,19 +65,40 @@ def lateral_wander(
         shocks[:, column] = rng.standard_normal(frames + 1)
     pace_s = dt_s * np.minimum(1.0, np.maximum(speed_mps.T, 0.0) / FULL_SPEED_MPS)
     keep = np.exp(-pace_s / time_s)
-    return np.ascontiguousarray(_follow(shocks, keep, pace_s, sd_m / filter_gain(time_s), np.maximum(limit_m, 1e-3)).T)
+    start = shocks[0] * (sd_m / filter_gain(time_s))
+    kicks = shocks[1:] * np.sqrt(1.0 - keep**2) * (sd_m / filter_gain(time_s))
+    if switch is not None:
+        _switch(switch, shocks, keep, pace_s, kicks)
+    return np.ascontiguousarray(_follow(start, kicks, keep, pace_s, np.maximum(limit_m, 1e-3)).T)
 
 
-def _follow(
+def _switch(
+    switch: WanderSwitch,
     shocks: Float64[np.ndarray, "start_and_time agent"],
     keep: Float64[np.ndarray, "time agent"],
     pace_s: Float64[np.ndarray, "time agent"],
-    sd_m: Float64[np.ndarray, " agent"],
+    kicks: Float64[np.ndarray, "time agent"],
+) -> None:
+    """Puts the agent's later part into `keep` and `kicks`."""
+    after, agent = slice(switch.frame, None), switch.agent
+    draws = shocks[1:][after, agent]
+    if switch.stream is not None:
+        draws = switch.stream.standard_normal(len(draws))
+    time_s = np.array([switch.style.lane_wander_time_s])
+    keep[after, agent] = np.exp(-pace_s[after, agent] / time_s)
+    sd_m = switch.style.lane_wander_m / filter_gain(time_s)
+    kicks[after, agent] = draws * np.sqrt(1.0 - keep[after, agent] ** 2) * sd_m
+
+
+def _follow(
+    start: Float64[np.ndarray, " agent"],
+    kicks: Float64[np.ndarray, "time agent"],
+    keep: Float64[np.ndarray, "time agent"],
+    pace_s: Float64[np.ndarray, "time agent"],
     limit_m: Float64[np.ndarray, " agent"],
 ) -> Float64[np.ndarray, "time agent"]:
     """Target and filter, step by step over all drivers at once."""
-    kicks = shocks[1:] * np.sqrt(1.0 - keep**2) * sd_m
-    target = shocks[0] * sd_m
+    target = start
     offset = limit_m * np.tanh(target / limit_m)
     rate = np.zeros_like(offset)
     result = np.empty_like(keep)

@@ -122,7 +122,7 @@ class EpisodeRunner:
         scene = backend.run_episode(scenario, job.population, **key, plan=job.plan)
         made = [with_driver_counts(scene)]
         if job.twins is not None:
-            twins = twins_of(scene, job.twins, **key)
+            twins = twins_of(scene, job.twins, job.population, backend=scenario.backend, **key)
             made[0] = with_count(made[0], "twins" if twins else "episodes_without_a_twin", max(1, len(twins)))
             for twin in twins:
                 plan = job.plan.model_copy(update={"twin": twin})

@@ -48,7 +48,7 @@ def bodies_of(log: RawLog, files: EpisodeFiles) -> Bodies:
     ahead = without_slide(segments.change(front), slide)
     speed = _speed(ahead, segments)
     length = np.array([files.drivers[name].length_m for name in log.driver_ids])[driver]
-    course = np.cumsum(ahead, axis=0)  # where the front would be had it only followed its lanes
+    course = segments.total(ahead)  # where the front would be had it only followed its lanes
     (tail,) = points_behind(course, directions(course, segments, rest), segments, (length,))
     offset = offsets(log, files, driver, step, speed, slide)
     nose = front + offset[:, None] * _left_of(course - tail)

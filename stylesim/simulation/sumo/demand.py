@@ -89,13 +89,18 @@ def check_routes(options: SumoOptions, network: RoadNetwork, *, name: str) -> No
                 )
 
 
-def routes_xml(drivers: tuple[Driver, ...]) -> str:
-    """The route file: a vehicle type and a vehicle for each driver."""
-    lines = [ROUTES_HEAD]
+def type_xml(driver: Driver) -> str:
+    """The driver's vehicle type."""
+    told = type_attributes(driver) | {"jmDriveAfterYellowTime": f"{ONSET_S:.2f}"}
+    attributes = " ".join(f'{key}="{value}"' for key, value in told.items())
+    return f'<vType id="{driver.type_id}" {attributes}/>'
+
+
+def routes_xml(drivers: tuple[Driver, ...], others: tuple[Driver, ...] = ()) -> str:
+    """The route file: a vehicle type and a vehicle for each driver, and types for who `others` will become."""
+    lines = [ROUTES_HEAD, *map(type_xml, others)]
     for driver in drivers:
-        told = type_attributes(driver) | {"jmDriveAfterYellowTime": f"{ONSET_S:.2f}"}
-        attributes = " ".join(f'{key}="{value}"' for key, value in told.items())
-        lines.append(f'<vType id="{driver.driver_id}" {attributes}/>')
+        lines.append(type_xml(driver))
         lines.append(
             f'<vehicle id="{driver.driver_id}" type="{driver.driver_id}" depart="{driver.depart_s:.1f}"'
             f' departLane="best" departSpeed="max" departPos="base"><route edges="{driver.route}"/></vehicle>'

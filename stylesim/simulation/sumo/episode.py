@@ -3,13 +3,17 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
+import numpy as np
+
+from stylesim.errors import InputError
 from stylesim.population import Population
 from stylesim.randomness import stream
 from stylesim.scenario import Scenario
 from stylesim.simulation.driving import HARDEST_BRAKING_MPS2
+from stylesim.simulation.plan import PLAIN, EpisodePlan, Twin, salted
 from stylesim.simulation.sumo.demand import check_routes, draw_drivers, routes_xml
 from stylesim.simulation.sumo.network import compiled_network
 from stylesim.simulation.sumo.options import SumoOptions, sumo_options_of
@@ -18,6 +22,7 @@ from stylesim.simulation.sumo.signals import programme_of, programmes_xml
 from stylesim.simulation.sumo.vehicles import Driver
 
 DT_S = 0.1
+TWIN_TYPE = "/twin"  # what the id of a driver's second vehicle type ends in
 
 
 @dataclass(frozen=True)
@@ -35,6 +40,21 @@ class EpisodeFiles:
     episode: int
     warm_up_s: float
     duration_s: float
+    twin: Twin | None = None
+    now: dict[str, Driver] = field(default_factory=dict)  # the drivers as they are at the moment; `drivers`: at first
+
+    @property
+    def switch_step(self) -> int:
+        """The first simulation step in which the twin's driver may differ; -1 where none changes on the way."""
+        if self.twin is None or self.twin.at_s is None:
+            return -1
+        return round((self.warm_up_s + self.twin.at_s) / DT_S) + 1
+
+    def stream(self, driver_id: str, purpose: str, *, step: int = 0) -> np.random.Generator:
+        """The driver's random stream for that purpose, from that step on (a null twin's is another one)."""
+        twin = self.twin
+        other = twin is not None and twin.new_noise and twin.driver == driver_id and step >= self.switch_step
+        return stream(self.seed, self.episode, driver_id, salted(purpose, new_noise=other))
 
     @property
     def signals(self) -> tuple[str, ...]:
@@ -48,7 +68,7 @@ class EpisodeFiles:
 
 
 def prepare_episode(
-    scenario: Scenario, population: Population, *, seed: int, episode: int, folder: Path
+    scenario: Scenario, population: Population, *, seed: int, episode: int, folder: Path, plan: EpisodePlan = PLAIN
 ) -> EpisodeFiles:
     """Draws an episode and writes its files into `folder` (which exists).
 
@@ -61,7 +81,8 @@ def prepare_episode(
     check_routes(options, network, name=scenario.name)
     drivers = draw_drivers(scenario, options, population, seed=seed, episode=episode, parameters=parameters)
     routes = folder / "routes.rou.xml"
-    routes.write_text(routes_xml(drivers), encoding="utf-8")
+    drivers, others = _with_twin(drivers, plan.twin)
+    routes.write_text(routes_xml(drivers, others), encoding="utf-8")
     additional = None
     if options.signals:
         share = float(stream(seed, episode, "", "signal offset").random())
@@ -80,7 +101,22 @@ def prepare_episode(
         episode=episode,
         warm_up_s=scenario.warm_up_s,
         duration_s=scenario.duration_s,
+        twin=plan.twin,
+        now={driver.driver_id: driver for driver in drivers},
     )
+
+
+def _with_twin(drivers: tuple[Driver, ...], twin: Twin | None) -> tuple[tuple[Driver, ...], tuple[Driver, ...]]:
+    """The drivers as they enter, and who one of them will become on the way (`switching.StyleSwitch`)."""
+    chosen = [driver for driver in drivers if twin is not None and driver.driver_id == twin.driver]
+    if twin is None:
+        return drivers, ()
+    if not chosen:
+        raise InputError(f"the twin's driver {twin.driver!r} does not exist in this episode")
+    other = replace(chosen[0], style=twin.style)
+    if twin.at_s is None:
+        return tuple(other if driver is chosen[0] else driver for driver in drivers), ()
+    return drivers, (replace(other, type_suffix=TWIN_TYPE),)
 
 
 def sumo_options(files: EpisodeFiles) -> list[str]:

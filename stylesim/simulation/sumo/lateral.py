@@ -5,11 +5,10 @@ from __future__ import annotations
 import numpy as np
 from jaxtyping import Float64, Int32
 
-from stylesim.randomness import stream
 from stylesim.simulation.sumo.episode import DT_S, EpisodeFiles
 from stylesim.simulation.sumo.paths import Points, Rows, Segments
 from stylesim.simulation.sumo.recorder import RawLog
-from stylesim.simulation.wander import ROOM_BEYOND_LANE_M, lateral_wander, smoothed_slide
+from stylesim.simulation.wander import ROOM_BEYOND_LANE_M, WanderSwitch, lateral_wander, smoothed_slide
 
 RENAMED_M = 1.0  # the lateral position jumps by a lane's width where SUMO renames the lane; a step moves 0.15 m at most
 
@@ -59,9 +58,20 @@ def offsets(
         speed,
         limit_m=np.maximum((narrowest - width) / 2 + ROOM_BEYOND_LANE_M, 0.0),
         dt_s=DT_S,
-        streams=[stream(files.seed, files.episode, item.driver_id, "wander") for item in drivers],
+        streams=[files.stream(item.driver_id, "wander") for item in drivers],
+        switch=_switch(log, files, begin),
     )
     return wander[driver, frame] + _lane_change_lag(driver, frame, speed, slide_m)
+
+
+def _switch(log: RawLog, files: EpisodeFiles, begin: Int32[np.ndarray, " driver"]) -> WanderSwitch | None:
+    """The change of the twin's driver on the way, on the clock of its rows."""
+    step, twin = files.switch_step, files.twin
+    if step < 0 or twin is None or twin.driver not in log.driver_ids:
+        return None
+    agent = log.driver_ids.index(twin.driver)
+    stream = files.stream(twin.driver, "wander", step=step) if twin.new_noise else None
+    return WanderSwitch(agent, max(0, step - int(begin[agent])), twin.style, stream)
 
 
 def _lane_change_lag(

@@ -5,6 +5,7 @@ Rows are ordered by vehicle, then step; a segment is an unbroken run of steps of
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
@@ -12,7 +13,6 @@ from jaxtyping import Bool, Float64, Int32, Int64
 
 Rows = Float64[np.ndarray, " row"]
 Points = Float64[np.ndarray, "row 2"]
-APART_M = 1000.0  # between segments on the common axis of `points_behind`
 MOVED_M = 0.01  # a step shorter than this (0.1 m/s) has no direction of its own
 
 
@@ -43,20 +43,33 @@ class Segments:
         result[self.starts] = 0.0
         return result
 
+    def slices(self) -> Iterator[slice]:
+        """The rows of each segment."""
+        ends = np.append(self.starts[1:], len(self.first))
+        for start, end in zip(self.starts.tolist(), ends.tolist(), strict=True):
+            yield slice(start, end)
+
+    def total(self, values: Rows | Points) -> Rows | Points:
+        """The sum of the rows of its segment up to each row.
+
+        Segment by segment, because a sum over all of them would round one vehicle's path by what others do.
+        """
+        result = np.empty_like(values)
+        for rows in self.slices():
+            np.cumsum(values[rows], axis=0, out=result[rows])
+        return result
+
 
 def directions(points_m: Points, segments: Segments, at_rest_rad: Rows) -> Points:
-    """Unit vectors along the path at each row; while standing the last one, before the first move the first one.
+    """Unit vectors along the path at each row; while standing the last one, before the first move `at_rest_rad`.
 
-    `at_rest_rad` is taken in segments that never move.
+    Nothing later than a row decides its direction.
     """
     step = segments.change(points_m)
     length = np.hypot(step[:, 0], step[:, 1])
     moved = length > MOVED_M
-    n = len(length)
-    last = np.maximum.accumulate(np.where(moved, np.arange(n), -1))
-    following = np.minimum.accumulate(np.where(moved, np.arange(n), n)[::-1])[::-1]
-    ends = np.append(segments.starts[1:], n)[np.searchsorted(segments.starts, segments.first)]
-    source = np.where(last >= segments.first, last, np.where(following < ends, following, -1))
+    last = np.maximum.accumulate(np.where(moved, np.arange(len(length)), -1))
+    source = np.where(last >= segments.first, last, -1)
     unit = step[source] / np.maximum(length[source], 1e-12)[:, None]
     rest = np.stack([np.cos(at_rest_rad), np.sin(at_rest_rad)], axis=1)
     return np.where((source >= 0)[:, None], unit, rest)
@@ -69,16 +82,15 @@ def points_behind(
 
     Before its first row a path is continued straight backwards.
     """
-    lead = max(float(distance.max(initial=0.0)) for distance in distances_m) + 1.0
     step = segments.change(points_m)
-    along = np.hypot(step[:, 0], step[:, 1])
-    along[segments.starts] = APART_M + lead
-    arc = np.cumsum(along)
-    behind = points_m[segments.starts] - lead * unit[segments.starts]
-    axis = np.insert(arc, segments.starts, arc[segments.starts] - lead)
-    x = np.insert(points_m[:, 0], segments.starts, behind[:, 0])
-    y = np.insert(points_m[:, 1], segments.starts, behind[:, 1])
-    return tuple(
-        np.stack([np.interp(arc - distance, axis, x), np.interp(arc - distance, axis, y)], axis=1)
-        for distance in distances_m
-    )
+    arc = segments.total(np.hypot(step[:, 0], step[:, 1]))
+    results = tuple(np.empty_like(points_m) for _ in distances_m)
+    for rows in segments.slices():
+        lead = max(float(distance[rows.start]) for distance in distances_m) + 1.0  # a body does not change its length
+        behind = points_m[rows.start] - lead * unit[rows.start]
+        axis = np.concatenate([[arc[rows.start] - lead], arc[rows]])
+        for dimension in (0, 1):
+            values = np.concatenate([[behind[dimension]], points_m[rows, dimension]])
+            for result, distance in zip(results, distances_m, strict=True):
+                result[rows, dimension] = np.interp(arc[rows] - distance[rows], axis, values)
+    return results

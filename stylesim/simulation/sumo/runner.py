@@ -14,6 +14,7 @@ from stylesim.simulation.sumo.episode import DT_S, EpisodeFiles, prepare_episode
 from stylesim.simulation.sumo.recorder import RawLog, Recorder
 from stylesim.simulation.sumo.scenes import scene_of
 from stylesim.simulation.sumo.stopzone import StopZone
+from stylesim.simulation.sumo.switching import StyleSwitch
 from stylesim.simulation.sumo.yellow import DecisionEvent, YellowController
 
 LEAD_S = 4.0  # recorded before the first logged frame, because bodies follow the path behind them
@@ -39,7 +40,7 @@ class SumoBackend:
         counted) until it arrives. Raises InputError, SimulationError.
         """
         with tempfile.TemporaryDirectory(prefix="stylesim-") as folder:
-            files = prepare_episode(scenario, population, seed=seed, episode=episode, folder=Path(folder))
+            files = prepare_episode(scenario, population, seed=seed, episode=episode, folder=Path(folder), plan=plan)
             log, decisions = self.simulate(files)
         return plan.applied_to(scene_of(log, decisions, files, name=scenario.name))
 
@@ -50,7 +51,9 @@ class SumoBackend:
         first = max(0, round((files.warm_up_s - LEAD_S) / DT_S))
         recorder = Recorder(engine.sumo, signals=files.signals, first_step=first)
         yellow, zone = YellowController(engine.sumo, files), StopZone(engine.sumo, files)
+        switch = StyleSwitch(engine.sumo, files, yellow)
         for step in range(round(files.end_s / DT_S)):
+            switch.before_step(step)
             yellow.before_step(step)
             zone.before_step(step)
             engine.step()

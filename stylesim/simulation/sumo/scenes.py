@@ -74,7 +74,7 @@ def _dense(
     warm: int,
     frames: int,
 ) -> Tracks:
-    drivers = [files.drivers[driver_ids[index]] for index in keep]
+    drivers = [files.now[driver_ids[index]] for index in keep]
     place = np.full(len(driver_ids), -1)
     place[keep] = np.arange(len(keep))
     at = (place[bodies.driver[logged]], bodies.step[logged] - warm)

@@ -33,6 +33,12 @@ class Driver:
     width_m: float
     depart_s: float
     route: str
+    type_suffix: str = ""  # of a driver's second vehicle type (`switching`)
+
+    @property
+    def type_id(self) -> str:
+        """The id of its vehicle type."""
+        return self.driver_id + self.type_suffix
 
 
 def draw_body(*, truck: bool, rng: np.random.Generator) -> tuple[AgentKind, float, float]:

@@ -16,7 +16,6 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from stylesim.randomness import stream
 from stylesim.simulation.driving import YellowDecision, decide_at_yellow
 from stylesim.simulation.sumo.engine import SumoApi
 from stylesim.simulation.sumo.episode import EpisodeFiles
@@ -48,6 +47,7 @@ class YellowController:
         self._shown = dict.fromkeys(files.signals, "")
         self._lane_of_link = {(link.signal, link.index): link.lane for link in files.network.links}
         self._changed: dict[str, tuple[str, int]] = {}  # driver -> the link whose green takes its change back
+        self._decided: dict[str, YellowDecision] = {}  # and what it decided there
         self._times_decided: dict[str, int] = {}
         self.events: list[DecisionEvent] = []
 
@@ -80,20 +80,25 @@ class YellowController:
     def _decide(self, driver_id: str, step: int, *, link: tuple[str, int], distance_m: float) -> None:
         number = self._times_decided.get(driver_id, 0)
         self._times_decided[driver_id] = number + 1
-        rng = stream(self._files.seed, self._files.episode, driver_id, f"yellow {number}")
-        style, speed = self._files.drivers[driver_id].style, self._sumo.vehicle.getSpeed(driver_id)
+        rng = self._files.stream(driver_id, f"yellow {number}", step=step)
+        style, speed = self._files.now[driver_id].style, self._sumo.vehicle.getSpeed(driver_id)
         decision = decide_at_yellow(style, speed_mps=speed, distance_m=distance_m, rng=rng)
         self._apply(driver_id, decision)
-        self._changed[driver_id] = link
+        self._changed[driver_id], self._decided[driver_id] = link, decision
         self.events.append(DecisionEvent(step, driver_id, decision.stop, speed, distance_m))
 
     def _apply(self, driver_id: str, decision: YellowDecision) -> None:
-        types, style = self._sumo.vehicletype, self._files.drivers[driver_id].style
-        after_red = OFF if decision.stop else f"{style.red_running_s:.2f}"
-        types.setParameter(driver_id, AFTER_RED, after_red)
-        types.setParameter(driver_id, AFTER_YELLOW, f"{decision.response_s:.2f}" if decision.stop else AT_ONSET)
+        types, driver = self._sumo.vehicletype, self._files.now[driver_id]
+        after_red = OFF if decision.stop else f"{driver.style.red_running_s:.2f}"
+        types.setParameter(driver.type_id, AFTER_RED, after_red)
+        types.setParameter(driver.type_id, AFTER_YELLOW, f"{decision.response_s:.2f}" if decision.stop else AT_ONSET)
         if decision.stop:
-            types.setDecel(driver_id, decision.deceleration_mps2)
+            types.setDecel(driver.type_id, decision.deceleration_mps2)
+
+    def tell_again(self, driver_id: str) -> None:
+        """What the driver has decided at a light that is still ahead holds for its new vehicle type, too."""
+        if driver_id in self._changed:
+            self._apply(driver_id, self._decided[driver_id])
 
     def _release(self, signal: str, shown: str) -> None:
         """Gives the drivers whose light is green again their ordinary selves back."""
@@ -101,6 +106,7 @@ class YellowController:
         for driver_id, (theirs, link) in list(self._changed.items()):
             if theirs == signal and shown[link] in "Gg":
                 del self._changed[driver_id]
-                types.setParameter(driver_id, AFTER_YELLOW, AT_ONSET)
-                types.setParameter(driver_id, AFTER_RED, OFF)
-                types.setDecel(driver_id, self._files.drivers[driver_id].style.comfortable_deceleration_mps2)
+                driver = self._files.now[driver_id]
+                types.setParameter(driver.type_id, AFTER_YELLOW, AT_ONSET)
+                types.setParameter(driver.type_id, AFTER_RED, OFF)
+                types.setDecel(driver.type_id, driver.style.comfortable_deceleration_mps2)

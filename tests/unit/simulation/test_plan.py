@@ -18,7 +18,7 @@ STYLE = Population.of(timid=1.0).draw(stream(0, 0, "", "style"))
 def test_a_plan_survives_json():
     plan = EpisodePlan(
         stressors=(Stressor(kind="deer", share=0.5),),
-        twin=Twin(name="twin", driver="west.3", style=STYLE, at_s=4.0),
+        twin=Twin(name="twin", driver="west.3", style=STYLE, from_style="careful", at_s=4.0),
         ego="planner:Mine",
     )
     assert EpisodePlan.model_validate(json.loads(json.dumps(plan.model_dump(mode="json")))) == plan
@@ -47,8 +47,9 @@ def test_doubled_stressors_and_unknown_styles_are_refused():
 def test_a_twin_is_paired_with_its_episode_and_stays_in_its_unit():
     scene = make_scene("yellow-7-00001")
     assert PLAIN.applied_to(scene) is scene
-    twin = EpisodePlan(twin=Twin(name="twin", driver="car-2", style=STYLE, at_s=4.0)).applied_to(scene)
+    planned = Twin(name="twin", driver="car-2", style=STYLE, from_style="careful", at_s=4.0)
+    twin = EpisodePlan(twin=planned).applied_to(scene)
     assert (twin.scene_id, twin.twin_of, twin.unit_id) == ("yellow-7-00001-twin", scene.scene_id, scene.unit_id)
     about = twin.metadata["twin"]
     assert (about["driver"], about["to_style"], about["at_s"], about["new_noise"]) == ("car-2", "timid", 4.0, False)
-    assert about["from_style"] == scene.tracks.driver[2].name
+    assert about["from_style"] == "careful"

@@ -24,7 +24,7 @@ def test_directions_hold_while_standing() -> None:
     standing = np.array([[5, 5], [5, 5]])
     points, segments = rows(moving, standing)
     unit = directions(points, segments, np.full(len(points), np.pi / 2))
-    np.testing.assert_allclose(unit, [[1, 0], [1, 0], [1, 0], [1, 0], [0, 1], [0, 1], [0, 1]], atol=1e-12)
+    np.testing.assert_allclose(unit, [[0, 1], [0, 1], [1, 0], [1, 0], [0, 1], [0, 1], [0, 1]], atol=1e-12)
 
 
 def test_places_further_back_lie_on_the_path() -> None:
