@@ -9,6 +9,7 @@ import typer
 from stylesim.cli.console import progress_bar, say, show_table
 from stylesim.errors import InputError, unknown
 from stylesim.population import Population
+from stylesim.simulation.plan import TwinRequest
 from stylesim.style import STYLE_CLASSES
 
 
@@ -41,6 +42,21 @@ def chosen_population(population: str | None, styles: str | None, reweight: str 
     return base.reweighted(**shares(reweight, "--reweight")) if reweight is not None else base
 
 
+def wanted_twins(at_s: float | None, start: str | None, style: str, *, null: bool) -> TwinRequest | None:
+    """What the options say about twins. InputError where they contradict each other."""
+    if start is not None and start != "start":
+        raise InputError(f"--twins-from: the only moment is 'start' (the driver's insertion), not {start!r}")
+    if at_s is not None and start is not None:
+        raise InputError("--twins-at and --twins-from: a driver changes on the way or from the start; choose one")
+    if at_s is None and start is None:
+        if style:
+            raise InputError("--twin-style says what the driver becomes; say when: --twins-at 8 or --twins-from start")
+        return None
+    if at_s is not None and at_s < 0:
+        raise InputError(f"--twins-at: a time in the log, 0 s or later, not {at_s:g}")
+    return TwinRequest(at_s=at_s, style=style, null=null)
+
+
 def generate(
     scenario: list[str] = typer.Argument(help="Scenarios by name (see `stylesim list scenarios`) or by folder."),
     out: Path = typer.Option(..., "--out", help="Folder of the new corpus; must not exist."),
@@ -53,14 +69,31 @@ def generate(
     seed: int = typer.Option(0, min=0, help="Same seed, same bytes."),
     workers: int = typer.Option(1, min=1, help="Simulations side by side, one process each."),
     resume: bool = typer.Option(False, help="Go on from an unfinished run of the same request."),
+    twins_at: float | None = typer.Option(
+        None, help="Beside each episode a twin of it in which one driver changes its style at this time (s of the log)."
+    ),
+    twins_from: str | None = typer.Option(
+        None, metavar="start", help="The same, but the driver has the other style from its insertion on: 'start'."
+    ),
+    twin_style: str = typer.Option("", help="The class that the twin's driver gets.", show_default="drawn"),
+    twin_null: bool = typer.Option(True, help="And a second twin: the same driver and style with other noise."),
 ) -> None:
     """Generate traffic with drivers of chosen styles into a new corpus."""
     from stylesim.simulation.generate import generate as run
 
     crowd = chosen_population(population, styles, reweight)
+    twins = wanted_twins(twins_at, twins_from, twin_style, null=twin_null)
     with progress_bar("generating", "episodes") as progress:
         corpus = run(
-            scenario, crowd, episodes=episodes, seed=seed, out=out, workers=workers, resume=resume, progress=progress
+            scenario,
+            crowd,
+            episodes=episodes,
+            seed=seed,
+            out=out,
+            workers=workers,
+            resume=resume,
+            twins=twins,
+            progress=progress,
         )
     counts = corpus.manifest["counts"]
     names = ("neutral",) if crowd.within_class == "neutral" else STYLE_CLASSES
@@ -72,7 +105,8 @@ def generate(
     others = {key: n for key, n in sorted(counts.items()) if not key.startswith("drivers.") and n}
     if others:
         show_table("Counted", ("what", "n"), list(others.items()))
-    say(f"{len(corpus)} episodes, {corpus.manifest['n_steps']} vehicle-steps: {out}")
+    paired = f" ({sum(bool(info.twin_of) for info in corpus.info)} of them twins)" if twins is not None else ""
+    say(f"{len(corpus)} episodes{paired}, {corpus.manifest['n_steps']} vehicle-steps: {out}")
 
 
 def add_to(app: typer.Typer) -> None:

@@ -11,7 +11,6 @@ from stylesim.randomness import stream
 from stylesim.scene import Scene
 from stylesim.simulation.plan import Twin, TwinRequest
 from stylesim.style import STYLE_CLASSES
-from stylesim.styles import road_kind
 
 LEAST_AHEAD_S = (
     5.0  # chosen, because a change of style takes seconds to show (a headway, a lane change) and must be seen
@@ -60,7 +59,7 @@ def twins_of(
     others = [name for name in STYLE_CLASSES if name != own.name]
     name = request.style or others[int(rng.integers(len(others)))]
     crowd = replace(population.reweighted(**{name: 1.0}), within_class="interval")
-    style = crowd.draw(rng, backend=backend, road=road_kind(scene.parameters.get("speed_limit_mps")))
+    style = crowd.draw(rng, backend=backend, limit_mps=scene.parameters.get("speed_limit_mps"))
     twin = Twin(name=TWIN, driver=driver_id, style=style, from_style=own.name, at_s=request.at_s)
     null = twin.model_copy(update={"name": NULL, "style": own, "new_noise": True})
     return (twin, null) if request.null else (twin,)
