@@ -31,7 +31,7 @@ def test_places_further_back_lie_on_the_path() -> None:
     corner = np.array([[0, 0], [4, 0], [4, 4], [4, 4], [4, 8]])
     other = np.array([[0, 9], [0, 10]])
     points, segments = rows(corner, other)
-    unit = directions(points, segments, np.zeros(len(points)))
+    unit = directions(points, segments, np.repeat([0.0, np.pi / 2], [5, 2]))
     (behind,) = points_behind(points, unit, segments, (np.full(len(points), 3.0),))
     expected = [[-3, 0], [1, 0], [4, 1], [4, 1], [4, 5], [0, 6], [0, 7]]
     np.testing.assert_allclose(behind, expected, atol=1e-9)
