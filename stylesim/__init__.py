@@ -32,6 +32,7 @@ _HOME = {
     "Tracks": "stylesim.tracks",
     "WindowSpec": "stylesim.windows",
     "balance": "stylesim.merging.balance",
+    "criticality": "stylesim.evaluation.criticality",
     "evaluate": "stylesim.report.evaluate",
     "fidelity": "stylesim.evaluation.fidelity",
     "generate": "stylesim.simulation.generate",

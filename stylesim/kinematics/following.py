@@ -60,3 +60,19 @@ def time_to_collision_s(
     nearing = closing > 0
     time = gap_m / np.where(nearing, closing, 1.0)
     return np.where(nearing, time, np.where(np.isnan(gap_m) | np.isnan(closing), np.nan, np.inf))
+
+
+def required_deceleration_mps2(
+    gap_m: Float[np.ndarray, "*any"],
+    speed_mps: Float[np.ndarray, "*any"],
+    leader_speed_mps: Float[np.ndarray, "*any"],
+) -> Float[np.ndarray, "*any"]:
+    """What the follower must brake with so as not to touch a leader who keeps his speed: closing^2 / (2 gap).
+
+    0 where it does not close, inf where there is no gap left, NaN where there is no leader. Also called the
+    deceleration rate to avoid a crash (Cooper and Ferguson 1976 [recalled]).
+    """
+    closing = np.maximum(speed_mps - leader_speed_mps, 0.0)
+    touching = gap_m <= 0
+    needed = closing**2 / (2.0 * np.where(touching, 1.0, gap_m))
+    return np.where(touching & (closing > 0), np.inf, needed)

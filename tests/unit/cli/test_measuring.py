@@ -20,3 +20,18 @@ def test_fidelity_of_a_corpus_and_a_wrong_ending(stylesim, tmp_path):
     assert said.code == 0
     assert "balanced" in said.out and "Who is not judged" in said.out
     assert json.loads((tmp_path / "f.json").read_text())["format"] == "stylesim-fidelity"
+
+
+def test_criticality_of_a_corpus_without_styles_or_population(stylesim, tmp_path):
+    path = tmp_path / "sim"
+    with CorpusWriter(path, source="made", configuration={}, seed=1) as writer:
+        for i in range(4):
+            writer.add(make_scene(f"s{i}", n_agents=9, n_frames=120, seed=i))
+        writer.finish()
+    no_population = stylesim("criticality", path, "--as-population", "naturalistic")
+    assert no_population.code == 2 and "names no population" in no_population.err
+    no_labels = stylesim("criticality", path, "--by", "tdbm")
+    assert no_labels.code == 2 and "label" in no_labels.err
+    said = stylesim("criticality", path, "--out", tmp_path / "c.json")
+    assert said.code == 0 and "Per 1,000 km" in said.out
+    assert json.loads((tmp_path / "c.json").read_text())["format"] == "stylesim-criticality"
