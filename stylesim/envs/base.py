@@ -80,7 +80,7 @@ class DrivingEnv(gym.Env[Float32[np.ndarray, " value"], Any]):
         if self._world is None:
             self._world = self._make_world()
         episode_seed = int(self.np_random.integers(MAX_SEED))
-        self._snapshot = self._world.reset(scenario=crowd.scenario, population=crowd.population, seed=episode_seed)
+        (self._snapshot,) = self._world.reset(scenario=crowd.scenario, population=crowd.population, seed=episode_seed)
         self._decoder.reset(self._snapshot.ego.speed_mps)
         self._renderer, self._over = None, False
         observation, info = self._seen(self._snapshot)
@@ -92,7 +92,7 @@ class DrivingEnv(gym.Env[Float32[np.ndarray, " value"], Any]):
         if self._snapshot is None or self._world is None or self._over:
             raise InputError("there is no running episode; call reset() first")
         command = self._decoder.command(action, self._snapshot.ego.speed_mps)
-        self._snapshot = self._world.step(command)
+        (self._snapshot,) = self._world.step([command])
         ego = self._snapshot.ego
         terms, costs = reward_terms(ego, self.config), cost_terms(self._snapshot, self.config)
         observation, info = self._seen(self._snapshot)

@@ -51,6 +51,7 @@ class EnvConfig(Spec):
         1.5,
         6.0,
     )  # to the stop line at the onset of yellow: the dilemma zone
+    entry: Literal["traffic", "yellow"] = "traffic"  # takes over a driver on its way, or meets a yellow on its approach
     approach_s: float = Field(default=4.0, ge=1.0, le=20)  # time from the first observation to the onset of yellow
     reward: RewardWeights = RewardWeights()
     cost: CostWeights = CostWeights()

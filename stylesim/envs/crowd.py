@@ -65,12 +65,18 @@ def _parsed_shares(text: str) -> dict[str, float]:
     return shares
 
 
-def resolved_scenario(scenario: Any, *, backend: str) -> Scenario:
-    """The scenario by name, path or object; InputError if it runs in another simulator than `backend`."""
+def place_of(scenario: Any) -> Scenario:
+    """The scenario by name, path or object; InputError for anything else."""
     if isinstance(scenario, str):
         scenario = load_scenario(scenario)
     if not isinstance(scenario, Scenario):
         raise InputError(f"scenario is a name, a path or a Scenario, not {type(scenario).__name__}")
+    return scenario
+
+
+def resolved_scenario(scenario: Any, *, backend: str) -> Scenario:
+    """The scenario by name, path or object; InputError if it runs in another simulator than `backend`."""
+    scenario = place_of(scenario)
     if scenario.backend != backend:
         fitting = [name for name in scenarios() if load_scenario(name).backend == backend]
         raise InputError(

@@ -12,17 +12,18 @@ import subprocess
 import sys
 import tempfile
 import weakref
+from collections.abc import Sequence
 from typing import IO
 
 from stylesim.envs.config import EnvConfig
 from stylesim.envs.wire import (
     Kind,
-    packed_command,
+    packed_commands,
     packed_episode,
     receive,
     send,
     unpacked_picture,
-    unpacked_snapshot,
+    unpacked_snapshots,
 )
 from stylesim.envs.world import EgoCommand, Picture, Snapshot
 from stylesim.errors import InputError, MissingDependencyError, SimulationError, StylesimError
@@ -38,10 +39,11 @@ GRACE_S = 2.0  # how long a child may take to end by itself
 
 
 class SumoWorld:
-    """The simulation behind `stylesim/YellowLight-v0`."""
+    """The simulation behind the environments in SUMO, with `egos` of them."""
 
-    def __init__(self, config: EnvConfig) -> None:
+    def __init__(self, config: EnvConfig, *, egos: int = 1) -> None:
         self._config = config
+        self._egos = egos
         self._child: subprocess.Popen[bytes] | None = None
         self._log: IO[bytes] | None = None
         self._finalizer: weakref.finalize[..., SumoWorld] | None = None
@@ -51,16 +53,16 @@ class SumoWorld:
         """Process id of the child, None while there is none."""
         return None if self._child is None else self._child.pid
 
-    def reset(self, *, scenario: Scenario, population: Population, seed: int) -> Snapshot:
+    def reset(self, *, scenario: Scenario, population: Population, seed: int) -> tuple[Snapshot, ...]:
         """A new episode; starts the child if there is none."""
         if self._child is None:
             self._start()
-        body = self._ask(Kind.RESET, packed_episode(scenario, population, seed, self._config))
-        return unpacked_snapshot(body)
+        body = self._ask(Kind.RESET, packed_episode(scenario, population, seed, self._config, self._egos))
+        return unpacked_snapshots(body)
 
-    def step(self, command: EgoCommand) -> Snapshot:
+    def step(self, commands: Sequence[EgoCommand]) -> tuple[Snapshot, ...]:
         """One decision period; SimulationError if the child has died."""
-        return unpacked_snapshot(self._ask(Kind.STEP, packed_command(command)))
+        return unpacked_snapshots(self._ask(Kind.STEP, packed_commands(commands)))
 
     def picture(self) -> Picture:
         """The road of this episode."""

@@ -13,7 +13,6 @@ from jaxtyping import Float64, Int64
 from stylesim.envs.sumo_light import LightWatch
 from stylesim.envs.sumo_wander import Wander
 from stylesim.envs.world import DECIDED_GO, DECIDED_STOP, Picture
-from stylesim.errors import InputError
 from stylesim.population import Population
 from stylesim.scenario import Scenario
 from stylesim.signals import SignalState
@@ -22,6 +21,7 @@ from stylesim.simulation.sumo.episode import DT_S, prepare_episode, sumo_options
 from stylesim.simulation.sumo.stopzone import StopZone
 from stylesim.simulation.sumo.yellow import YellowController
 from stylesim.style import STYLE_CLASSES
+from stylesim.tracks import AgentKind
 
 LONGEST_WAIT_S = 120.0  # chosen: an ego that waits for its place has one by then; drawing more drivers slows a reset
 
@@ -45,8 +45,6 @@ class SumoCrowd:
         longer = scenario.model_copy(update={"duration_s": until_s})
         with tempfile.TemporaryDirectory(prefix="stylesim-env-") as folder:
             self.files = prepare_episode(longer, population, seed=seed, episode=0, folder=Path(folder))
-            if not self.files.signals:
-                raise InputError(f"scenario {scenario.name!r} has no traffic light; this environment needs one")
             engine.load([*sumo_options(self.files), *TOUCHING_ONLY])  # reads the files whole
         self._engine = engine
         self.sumo: Any = engine.sumo
@@ -121,6 +119,15 @@ class SumoCrowd:
             speed = np.hypot(poses[:, 2], poses[:, 3])
             self._poses = shifted(poses, *self._wander.advance(self.rows, speed))
         return self._poses
+
+    def look_again(self) -> None:
+        """Somebody was taken off the road from outside: the next step asks who is there."""
+        self._here = {}
+
+    def drivers_here(self) -> list[str]:
+        """Ids of the cars (no trucks) on the road that the crowd drives, in order of entry."""
+        cars = self.files.drivers
+        return [name for name in self._here if cars[name].kind == AgentKind.CAR]
 
     def light(self, link: tuple[str, int]) -> tuple[SignalState, float]:
         """What one link (light, index) is shown, and for how many seconds it has been."""

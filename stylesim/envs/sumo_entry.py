@@ -1,8 +1,8 @@
-"""Where and when the ego enters a SUMO scenario: on an approach, so that a yellow light will confront it."""
+"""Where and when egos enter a SUMO scenario: in a driver's stead, or on an approach before a yellow light."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from typing import Any
 
@@ -10,16 +10,15 @@ import numpy as np
 
 from stylesim.envs.config import EnvConfig
 from stylesim.errors import InputError, SimulationError
+from stylesim.simulation.sumo.takeover import LENGTH_M, Place, choose_places, put, take_over
 
 EGO = "ego"
-ROUTE = "ego.route"
 TRIES = 24  # places that are looked at for each onset
 ONSETS = 4  # onsets that are waited for before any gap is taken
 HEADWAY_S = 1.2  # chosen: the time gap at which a place counts as free, near what drivers keep (0.96-1.92 s)
 STANDSTILL_M = 4.0
 TIGHT_M = 1.0  # what must be free before and behind an ego that is squeezed in
 COMFORT_MPS2 = 2.0  # comfortable deceleration, REFERENCE section 5
-LENGTH_M, WIDTH_M = 5.0, 1.8  # a passenger car, SUMO's default
 
 
 @dataclass(frozen=True)
@@ -34,7 +33,7 @@ class Approach:
 
 
 @dataclass(frozen=True)
-class Place:
+class Gap:
     """A lane, the position of the front bumper on it, and how much room is left there (below 0: too narrow)."""
 
     lane: str
@@ -86,16 +85,16 @@ def _phases(sumo: Any, light: str) -> Any:
     raise SimulationError(f"SUMO does not know the running program {running!r} of the light {light!r}")
 
 
-def find_place(sumo: Any, approach: Approach, rng: np.random.Generator, config: EnvConfig) -> Place:
+def find_place(sumo: Any, approach: Approach, rng: np.random.Generator, config: EnvConfig) -> Gap:
     """The roomiest of some random places from which the onset comes at a drawn time to the stop line."""
-    best: Place | None = None
+    best: Gap | None = None
     for _ in range(TRIES):
         lane = approach.lanes[int(rng.integers(len(approach.lanes)))]
         tts_s = float(rng.uniform(*config.onset_tts_s))
         length, limit = sumo.lane.getLength(lane), sumo.lane.getMaxSpeed(lane)
         speed = min(limit, (length - LENGTH_M) / (config.approach_s + tts_s), config.max_speed_mps)
         position = length - speed * (config.approach_s + tts_s)
-        place = Place(lane, position, speed, _slack_m(sumo, lane, position, speed))
+        place = Gap(lane, position, speed, _slack_m(sumo, lane, position, speed))
         if place.slack_m >= 0:
             return place
         if best is None or place.slack_m > best.slack_m:
@@ -124,9 +123,36 @@ def _braking_m(behind_mps: float, ahead_mps: float) -> float:
     return max(behind_mps - ahead_mps, 0.0) ** 2 / (2 * COMFORT_MPS2)
 
 
-def insert_ego(
-    sumo: Any, advance: Callable[[float], None], *, rng: np.random.Generator, config: EnvConfig
-) -> tuple[Approach, Place]:
+def ego_names(count: int) -> tuple[str, ...]:
+    """The first is `ego`, and with several of them the others are `ego.1`, `ego.2`, …."""
+    return (EGO, *(f"{EGO}.{number}" for number in range(1, count)))
+
+
+def insert_egos(
+    sumo: Any,
+    advance: Callable[[float], None],
+    drivers: Callable[[], Iterable[str]],
+    *,
+    names: tuple[str, ...],
+    rng: np.random.Generator,
+    config: EnvConfig,
+) -> tuple[float, ...]:
+    """Bring the egos into the traffic as `config.entry` says; their speeds in m/s.
+
+    InputError where several egos shall meet the same yellow, SimulationError where there is no room or nobody to
+    take over.
+    """
+    if config.entry == "yellow":
+        if len(names) > 1:
+            raise InputError("entry 'yellow' is for one ego; several take over drivers with entry 'traffic'")
+        return (insert_ego(sumo, advance, rng=rng, config=config).speed_mps,)
+    chosen = choose_places(sumo, drivers, advance, count=len(names), rng=rng)
+    for place, name in zip(chosen, names, strict=True):
+        take_over(sumo, place, name)
+    return tuple(place.speed_mps for place in chosen)
+
+
+def insert_ego(sumo: Any, advance: Callable[[float], None], *, rng: np.random.Generator, config: EnvConfig) -> Gap:
     """Run the crowd (`advance(until_s)`) until the ego can enter, and put it there.
 
     Where no place is free at the drawn approach at four onsets, the ego enters the widest gap of all approaches at
@@ -137,21 +163,22 @@ def insert_ego(
     for _ in range(ONSETS):
         onset_s = next_onset_s(sumo, approach, sumo.simulation.getTime() + config.approach_s)
         advance(onset_s - config.approach_s)
-        place = find_place(sumo, approach, rng, config)
-        if place.slack_m >= 0:
+        gap = find_place(sumo, approach, rng, config)
+        if gap.slack_m >= 0:
             break
     else:
-        approach, place = max(
+        approach, gap = max(
             ((option, widest_gap(sumo, lane)) for option in options for lane in option.lanes),
             key=lambda item: item[1].slack_m,
         )
-    if place.slack_m < 0:
+    if gap.slack_m < 0:
         raise SimulationError("no approach has room for the ego: the demand is too high")
-    _put(sumo, approach, place)
-    return approach, place
+    way = (approach.edge, approach.next_edge)
+    put(sumo, Place("", gap.lane, gap.position_m, gap.speed_mps, way, 0.0), EGO)
+    return gap
 
 
-def widest_gap(sumo: Any, lane: str) -> Place:
+def widest_gap(sumo: Any, lane: str) -> Gap:
     """The middle of the widest gap between two vehicles of a lane (or its ends), at a pace that can be braked."""
     vehicles = sorted(
         (sumo.vehicle.getLanePosition(name), sumo.vehicle.getLength(name), sumo.vehicle.getSpeed(name))
@@ -164,18 +191,4 @@ def widest_gap(sumo: Any, lane: str) -> Place:
     best = int(np.argmax(widths))
     ahead_m = max((widths[best] - LENGTH_M) / 2, 0.0)
     pace = min(sumo.lane.getMaxSpeed(lane), float(np.sqrt(paces[best] ** 2 + 2 * COMFORT_MPS2 * ahead_m)))
-    return Place(lane, rears[best] - ahead_m, pace, ahead_m - TIGHT_M)
-
-
-def _put(sumo: Any, approach: Approach, place: Place) -> None:
-    sumo.vehicletype.copy("DEFAULT_VEHTYPE", EGO)
-    for name, value in (("Length", LENGTH_M), ("Width", WIDTH_M), ("MaxSpeed", 70.0)):
-        getattr(sumo.vehicletype, f"set{name}")(EGO, value)
-    sumo.route.add(ROUTE, [approach.edge, approach.next_edge])
-    lane_index = place.lane.rsplit("_", 1)[1]
-    sumo.vehicle.add(EGO, ROUTE, typeID=EGO, departLane=lane_index, departSpeed="0")
-    sumo.vehicle.setSpeedMode(EGO, 32)  # no safe speed, no limits, no right of way, no red light: only commands
-    sumo.vehicle.setLaneChangeMode(EGO, 0)  # changes lane when told to, never by itself, whoever is there
-    sumo.vehicle.moveTo(EGO, place.lane, place.position_m)
-    sumo.vehicle.setPreviousSpeed(EGO, place.speed_mps)
-    sumo.vehicle.setSpeed(EGO, place.speed_mps)
+    return Gap(lane, rears[best] - ahead_m, pace, ahead_m - TIGHT_M)

@@ -18,10 +18,10 @@ from stylesim.envs.wire import (
     Kind,
     packed_json,
     packed_picture,
-    packed_snapshot,
+    packed_snapshots,
     receive,
     send,
-    unpacked_command,
+    unpacked_commands,
     unpacked_episode,
 )
 from stylesim.errors import SimulationError, StylesimError
@@ -48,13 +48,13 @@ class Server:
         if kind is Kind.RESET:
             self._episode = None
             self._engine = self._engine or Engine()  # here, so that a missing libsumo is answered and not died of
-            scenario, population, seed, config = unpacked_episode(body)
-            self._episode = SumoEpisode(self._engine, scenario, population, seed=seed, config=config)
-            return Kind.SNAPSHOT, packed_snapshot(self._episode.first)
+            scenario, population, seed, config, egos = unpacked_episode(body)
+            self._episode = SumoEpisode(self._engine, scenario, population, seed=seed, config=config, egos=egos)
+            return Kind.SNAPSHOT, packed_snapshots(self._episode.first)
         if self._episode is None:
             raise SimulationError("no episode is running; call reset()")
         if kind is Kind.STEP:
-            return Kind.SNAPSHOT, packed_snapshot(self._episode.step(unpacked_command(body)))
+            return Kind.SNAPSHOT, packed_snapshots(self._episode.step(unpacked_commands(body)))
         return Kind.PICTURE, packed_picture(self._episode.picture())
 
     def close(self) -> None:

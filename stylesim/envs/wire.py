@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import json
 import struct
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from enum import Enum
 from typing import Any, Protocol, runtime_checkable
 
@@ -24,6 +24,7 @@ from stylesim.scenario import Scenario
 HEAD = struct.Struct("<IB")
 COMMAND = struct.Struct("<ddb")
 COUNTS = struct.Struct("<II")
+LENGTH = struct.Struct("<I")
 COLUMNS: tuple[tuple[str, str, int], ...] = (  # field of Snapshot, dtype, numbers per vehicle
     ("pose", "<f8", 7),
     ("number", "<i4", 1),
@@ -87,14 +88,31 @@ def packed_json(value: Mapping[str, Any]) -> bytes:
     return json.dumps(value).encode()
 
 
-def packed_command(command: EgoCommand) -> bytes:
+def packed_commands(commands: Sequence[EgoCommand]) -> bytes:
     """The body of a step."""
-    return COMMAND.pack(*command)
+    return b"".join(COMMAND.pack(*command) for command in commands)
 
 
-def unpacked_command(body: bytes) -> EgoCommand:
-    """The command in the body of a step."""
-    return EgoCommand(*COMMAND.unpack(body))
+def unpacked_commands(body: bytes) -> tuple[EgoCommand, ...]:
+    """The commands in the body of a step."""
+    return tuple(EgoCommand(*numbers) for numbers in COMMAND.iter_unpack(body))
+
+
+def packed_snapshots(snapshots: Sequence[Snapshot]) -> bytes:
+    """Snapshots as bytes, each behind its length."""
+    bodies = [packed_snapshot(snapshot) for snapshot in snapshots]
+    return b"".join(part for body in bodies for part in (LENGTH.pack(len(body)), body))
+
+
+def unpacked_snapshots(body: bytes) -> tuple[Snapshot, ...]:
+    """What `packed_snapshots` packed."""
+    found, at = [], 0
+    while at < len(body):
+        (length,) = LENGTH.unpack_from(body, at)
+        at += LENGTH.size
+        found.append(unpacked_snapshot(body[at : at + length]))
+        at += length
+    return tuple(found)
 
 
 def packed_snapshot(snapshot: Snapshot) -> bytes:
@@ -119,7 +137,7 @@ def unpacked_snapshot(body: bytes) -> Snapshot:
     return Snapshot(ego=ego, lights=np.frombuffer(body, "i1", lights, at).copy(), **columns)
 
 
-def packed_episode(scenario: Scenario, population: Population, seed: int, config: EnvConfig) -> bytes:
+def packed_episode(scenario: Scenario, population: Population, seed: int, config: EnvConfig, egos: int) -> bytes:
     """What a new episode needs."""
     crowd = {"name": population.name, "shares": population.shares, "within_class": population.within_class}
     return packed_json({
@@ -127,16 +145,17 @@ def packed_episode(scenario: Scenario, population: Population, seed: int, config
         "population": crowd,
         "seed": seed,
         "config": config.model_dump(mode="json"),
+        "egos": egos,
     })  # fmt: skip
 
 
-def unpacked_episode(body: bytes) -> tuple[Scenario, Population, int, EnvConfig]:
+def unpacked_episode(body: bytes) -> tuple[Scenario, Population, int, EnvConfig, int]:
     """What `packed_episode` packed."""
     raw = json.loads(body)
     crowd = raw["population"]
     population = Population(crowd["name"], tuple(crowd["shares"]), crowd["within_class"])
     scenario = Scenario.model_validate(raw["scenario"])
-    return scenario, population, int(raw["seed"]), EnvConfig.model_validate(raw["config"])
+    return scenario, population, int(raw["seed"]), EnvConfig.model_validate(raw["config"]), int(raw["egos"])
 
 
 def packed_picture(picture: Picture) -> bytes:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import NamedTuple, Protocol, runtime_checkable
 
@@ -15,6 +16,7 @@ from stylesim.scenario import Scenario
 
 NO_DECISION, DECIDED_STOP, DECIDED_GO = 0, 1, 2
 DECISIONS = ("", "stop", "go")
+LEAVES = 127  # fits the byte that carries a lane change
 
 
 class EgoCommand(NamedTuple):
@@ -22,7 +24,7 @@ class EgoCommand(NamedTuple):
 
     acceleration_mps2: float
     target_speed_mps: float
-    lane_change: int  # +1 to the left, -1 to the right, 0 none
+    lane_change: int  # +1 to the left, -1 to the right, 0 none, LEAVES to be taken off the road
 
     def wished_acceleration(self, speed_mps: float, config: EnvConfig) -> float:
         """The acceleration at this speed, within the ego's limits."""
@@ -31,6 +33,9 @@ class EgoCommand(NamedTuple):
         else:
             wish = (self.target_speed_mps - speed_mps) / config.speed_control_time_s
         return float(min(max(wish, -config.max_deceleration_mps2), config.max_acceleration_mps2))
+
+
+LEAVE = EgoCommand(0.0, float("nan"), LEAVES)  # for an ego whose episode is over while others go on
 
 
 class EgoState(NamedTuple):
@@ -80,13 +85,16 @@ class Picture:
 
 @runtime_checkable
 class World(Protocol):
-    """A simulation with an ego in it."""
+    """A simulation with one ego or several in it; every ego sees everybody, itself in row 0."""
 
-    def reset(self, *, scenario: Scenario, population: Population, seed: int) -> Snapshot:
-        """A new episode. SimulationError if the simulator refuses."""
+    def reset(self, *, scenario: Scenario, population: Population, seed: int) -> tuple[Snapshot, ...]:
+        """A new episode; one snapshot for each ego. SimulationError if the simulator refuses."""
 
-    def step(self, command: EgoCommand) -> Snapshot:
-        """One decision period."""
+    def step(self, commands: Sequence[EgoCommand]) -> tuple[Snapshot, ...]:
+        """One decision period, a command and a snapshot for each ego; it is cut short where no ego is left.
+
+        An ego that has collided or arrived keeps its last state; where others go on it is taken off the road.
+        """
 
     def picture(self) -> Picture:
         """The road of this episode."""

@@ -11,24 +11,38 @@ from gymnasium.utils.env_checker import check_env
 
 from stylesim.envs.registration import IDS, register
 from stylesim.errors import InputError
-from stylesim.scenario import load_scenario
+from stylesim.scenario import load_scenario, scenarios
 
 register()
 
 
+FULLY = ("stylesim/Highway-v0", "stylesim/RampMerge-v0", "stylesim/YellowLight-v0")  # the others in the slow run
+
+
 def options(env_id: str) -> dict[str, Any]:
     """What makes an environment quick: a short warm-up, few cars, short episodes."""
-    if "Highway" in env_id:
-        scenario = load_scenario("highway")
+    scenario = load_scenario(IDS[env_id])
+    if scenario.backend == "highway":
         few = scenario.model_copy(update={"options": {**scenario.options, "vehicles": 6}})
         return {"scenario": few, "config": {"period_s": 0.2, "duration_s": 8.0}}
-    scenario = load_scenario("yellow_light").model_copy(update={"warm_up_s": 5.0})
-    return {"scenario": scenario, "config": {"duration_s": 15.0, "period_s": 0.2}}
+    short = scenario.model_copy(update={"warm_up_s": 5.0 if env_id == "stylesim/YellowLight-v0" else 20.0})
+    return {"scenario": short, "config": {"duration_s": 15.0, "period_s": 0.2}}
 
 
-@pytest.fixture(params=sorted(IDS))
+def cases() -> list[Any]:
+    """Every id; all but three are slow."""
+    return [pytest.param(name, marks=() if name in FULLY else pytest.mark.slow) for name in sorted(IDS)]
+
+
+@pytest.fixture(params=cases())
 def env_id(request: pytest.FixtureRequest) -> str:
     return str(request.param)
+
+
+def test_every_scenario_has_an_id() -> None:
+    assert set(IDS.values()) == set(scenarios())
+    for env_id in IDS:
+        assert gym.spec(env_id).entry_point is not None
 
 
 @pytest.mark.parametrize("action_type", ["discrete", "continuous"])

@@ -1,4 +1,4 @@
-"""Stable-Baselines3 learns on both ids without complaint (not: learns well)."""
+"""Stable-Baselines3 learns on an id of each simulator without complaint (not: learns well)."""
 
 from __future__ import annotations
 
@@ -6,13 +6,13 @@ import gymnasium as gym
 import numpy as np
 import pytest
 
-from stylesim.envs.registration import IDS, register
+from stylesim.envs.registration import register
 
 register()
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("env_id", sorted(IDS))
+@pytest.mark.parametrize("env_id", ["stylesim/Highway-v0", "stylesim/YellowLight-v0"])
 def test_ppo_runs(env_id: str, quick_options) -> None:
     ppo = pytest.importorskip("stable_baselines3").PPO
     env = gym.make(env_id, **quick_options[env_id])

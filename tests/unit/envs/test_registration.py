@@ -3,7 +3,7 @@ import sys
 
 import gymnasium as gym
 
-from stylesim.envs.registration import IDS, register
+from stylesim.envs.registration import IDS, env_id, register
 
 
 def test_registering_twice_changes_nothing() -> None:
@@ -21,3 +21,9 @@ def test_registering_loads_no_simulator() -> None:
     )
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert done.stdout.strip() == "[]"
+
+
+def test_ids_are_the_scenarios_in_camel_case() -> None:
+    assert env_id("stop_and_go") == "stylesim/StopAndGo-v0"
+    assert IDS["stylesim/YellowLight-v0"] == "yellow_light"
+    assert IDS["stylesim/Highway-v0"] == "highway"

@@ -21,7 +21,7 @@ COAST = EgoCommand(0.0, float("nan"), 0)
 
 
 def started(config: EnvConfig | None = None) -> SumoWorld:
-    world = SumoWorld(config or EnvConfig())
+    world = SumoWorld(config or EnvConfig(entry="yellow"))
     scenario = load_scenario("yellow_light").model_copy(update={"warm_up_s": 2.0})
     world.reset(scenario=scenario, population=Population.load("naturalistic"), seed=1)
     return world
@@ -65,9 +65,9 @@ def test_a_dead_child_is_reported_and_replaced_at_the_next_reset() -> None:
     assert world.pid is not None
     os.kill(world.pid, signal.SIGKILL)
     with pytest.raises(SimulationError, match="has died"):
-        world.step(COAST)
+        world.step([COAST])
     scenario = load_scenario("yellow_light").model_copy(update={"warm_up_s": 2.0})
-    again = world.reset(scenario=scenario, population=Population.load("naturalistic"), seed=1)
+    (again,) = world.reset(scenario=scenario, population=Population.load("naturalistic"), seed=1)
     assert again.ego.speed_mps > 5
     world.close()
 
@@ -79,7 +79,7 @@ def test_errors_of_the_child_come_back_as_what_they_are_and_it_lives_on() -> Non
         world.reset(scenario=load_scenario("ramp_merge"), population=Population.load("naturalistic"), seed=1)
     assert world.pid == pid
     with pytest.raises(SimulationError, match="reset"):
-        world.step(COAST)
+        world.step([COAST])
     world.close()
 
 
@@ -108,15 +108,15 @@ def test_the_child_ends_with_its_killed_parent() -> None:
 def test_the_ego_can_stop_run_red_and_collide() -> None:
     outcomes = {"stopped": False, "red": False, "collided": False}
     scenario = load_scenario("yellow_light").model_copy(update={"warm_up_s": 20.0})
-    world = SumoWorld(EnvConfig(period_s=0.2, onset_tts_s=(4.5, 6.0)))
+    world = SumoWorld(EnvConfig(entry="yellow", period_s=0.2, onset_tts_s=(4.5, 6.0)))
     for seed in range(6):
         world.reset(scenario=scenario, population=Population.load("naturalistic"), seed=seed)
         for _ in range(40):  # brakes at once
-            snapshot = world.step(EgoCommand(-4.0, float("nan"), 0))
+            (snapshot,) = world.step([EgoCommand(-4.0, float("nan"), 0)])
         outcomes["stopped"] |= snapshot.ego.speed_mps == 0.0
         world.reset(scenario=scenario, population=Population.load("naturalistic"), seed=seed)
         for _ in range(100):  # drives on whatever comes
-            snapshot = world.step(COAST)
+            (snapshot,) = world.step([COAST])
             outcomes["red"] |= snapshot.ego.reds_run > 0
             outcomes["collided"] |= snapshot.ego.collided > 0
         if all(outcomes.values()):
@@ -126,12 +126,12 @@ def test_the_ego_can_stop_run_red_and_collide() -> None:
 
 
 def test_the_onset_of_yellow_comes_when_it_was_drawn_to_come() -> None:
-    world = SumoWorld(EnvConfig(onset_tts_s=(3.0, 3.0), approach_s=2.0))
+    world = SumoWorld(EnvConfig(entry="yellow", onset_tts_s=(3.0, 3.0), approach_s=2.0))
     scenario = load_scenario("yellow_light").model_copy(update={"warm_up_s": 2.0})
-    first = world.reset(scenario=scenario, population=Population.load("naturalistic"), seed=4)
+    (first,) = world.reset(scenario=scenario, population=Population.load("naturalistic"), seed=4)
     states, tts = [], []
     for _ in range(30):
-        snapshot = world.step(COAST)
+        (snapshot,) = world.step([COAST])
         states.append(snapshot.ego.signal_state)
         tts.append(snapshot.ego.stop_line_m / snapshot.ego.speed_mps)
     world.close()
@@ -143,14 +143,14 @@ def test_the_onset_of_yellow_comes_when_it_was_drawn_to_come() -> None:
 
 
 def test_a_lane_change_takes_the_ego_to_the_next_lane_and_no_further() -> None:
-    world = SumoWorld(EnvConfig(approach_s=6.0, onset_tts_s=(4.0, 4.0)))
+    world = SumoWorld(EnvConfig(entry="yellow", approach_s=6.0, onset_tts_s=(4.0, 4.0)))
     scenario = load_scenario("yellow_light").model_copy(update={"warm_up_s": 2.0})
     for seed in range(12):  # until the ego starts on the right lane of the main road
-        first = world.reset(scenario=scenario, population=Population.load("naturalistic"), seed=seed)
+        (first,) = world.reset(scenario=scenario, population=Population.load("naturalistic"), seed=seed)
         if first.ego.lanes_left == 1:
             break
     for _ in range(60):
-        snapshot = world.step(EgoCommand(0.0, float("nan"), 1))
+        (snapshot,) = world.step([EgoCommand(0.0, float("nan"), 1)])
         if snapshot.ego.collided:
             break
     world.close()
@@ -165,9 +165,9 @@ def test_the_ego_finds_room_in_a_crowd_that_queues_back() -> None:
     scenario = load_scenario("yellow_light")
     demand = scenario.parameters["demand_vph"].model_copy(update={"low": 5000.0, "high": 5000.0})
     dense = scenario.model_copy(update={"parameters": {**scenario.parameters, "demand_vph": demand}})
-    world = SumoWorld(EnvConfig())
+    world = SumoWorld(EnvConfig(entry="yellow"))
     for seed in range(8):
-        first = world.reset(scenario=dense, population=Population.load("naturalistic"), seed=seed)
+        (first,) = world.reset(scenario=dense, population=Population.load("naturalistic"), seed=seed)
         assert not first.ego.collided
-        assert not world.step(EgoCommand(-3.0, float("nan"), 0)).ego.collided
+        assert not world.step([EgoCommand(-3.0, float("nan"), 0)])[0].ego.collided
     world.close()

@@ -11,7 +11,7 @@ import pytest
 from gymnasium.vector import AsyncVectorEnv, SyncVectorEnv
 
 from stylesim.envs.registration import IDS, register
-from tests.unit.envs.conftest import quick_highway, quick_yellow_light
+from stylesim.scenario import load_scenario
 
 register()
 
@@ -24,9 +24,12 @@ class Maker:
 
     def __call__(self) -> gym.Env[Any, Any]:
         register()
-        if "Highway" in self.env_id:
-            return gym.make(self.env_id, scenario=quick_highway(), config={"period_s": 0.2, "duration_s": 2.0})
-        return gym.make(self.env_id, scenario=quick_yellow_light(), config={"duration_s": 2.0})
+        scenario = load_scenario(IDS[self.env_id])
+        if scenario.backend == "highway":
+            few = scenario.model_copy(update={"options": {**scenario.options, "vehicles": 6}})
+            return gym.make(self.env_id, scenario=few, config={"period_s": 0.2, "duration_s": 2.0})
+        short = scenario.model_copy(update={"warm_up_s": 5.0 if "YellowLight" in self.env_id else 20.0})
+        return gym.make(self.env_id, scenario=short, config={"duration_s": 2.0})
 
 
 def played(envs: gym.vector.VectorEnv[Any, Any, Any]) -> tuple[np.ndarray, np.ndarray, dict[str, Any]]:

@@ -6,18 +6,20 @@ import pytest
 from stylesim.envs.config import EnvConfig
 from stylesim.envs.wire import (
     Kind,
-    packed_command,
+    packed_commands,
     packed_episode,
     packed_picture,
     packed_snapshot,
+    packed_snapshots,
     receive,
     send,
-    unpacked_command,
+    unpacked_commands,
     unpacked_episode,
     unpacked_picture,
     unpacked_snapshot,
+    unpacked_snapshots,
 )
-from stylesim.envs.world import EgoCommand, Picture
+from stylesim.envs.world import LEAVES, EgoCommand, Picture
 from stylesim.population import Population
 from stylesim.road import Lane, Road
 from stylesim.scenario import load_scenario
@@ -33,12 +35,21 @@ def test_a_snapshot_survives_the_wire_bit_for_bit() -> None:
         assert getattr(got, name).tobytes() == getattr(sent, name).tobytes()
 
 
+def test_several_snapshots_keep_their_order_and_their_lengths() -> None:
+    sent = [made_snapshot([(float(i), 2.0, 3.0, 4.0, 0.5)] * i) for i in range(3)]
+    got = unpacked_snapshots(packed_snapshots(sent))
+    assert [packed_snapshot(one) for one in got] == [packed_snapshot(one) for one in sent]
+    assert unpacked_snapshots(b"") == ()
+
+
 def test_commands_and_episodes() -> None:
-    assert unpacked_command(packed_command(EgoCommand(-1.5, 20.0, -1))) == (-1.5, 20.0, -1)
+    commands = (EgoCommand(-1.5, 20.0, -1), EgoCommand(0.5, 1.0, LEAVES))
+    assert unpacked_commands(packed_commands(commands)) == commands
     crowd = Population.load("rare_heavy")
     config = EnvConfig(duration_s=12.0)
-    scenario, population, seed, got = unpacked_episode(packed_episode(load_scenario("yellow_light"), crowd, 9, config))
-    assert (scenario, seed, got) == (load_scenario("yellow_light"), 9, config)
+    body = packed_episode(load_scenario("yellow_light"), crowd, 9, config, 3)
+    scenario, population, seed, got, egos = unpacked_episode(body)
+    assert (scenario, seed, got, egos) == (load_scenario("yellow_light"), 9, config, 3)
     assert (population.name, population.shares) == (crowd.name, crowd.shares)
 
 
