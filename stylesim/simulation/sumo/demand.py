@@ -56,7 +56,7 @@ def _driver(flow: Flow, number: int, depart_s: float, population: Population, ar
     kind, length, width = draw_body(truck=truck, rng=body)
     limit = arrivals.parameters.get("speed_limit_mps")
     style = population.draw(stream(seed, episode, name, "style"), backend="sumo", limit_mps=limit)
-    return Driver(name, style, kind, length, width, depart_s, f"{flow.enter} {way}")
+    return Driver(name, style, kind, length, width, depart_s, f"{flow.enter} {way}".strip())
 
 
 def draw_drivers(

@@ -42,7 +42,7 @@ class Flow(Spec):
     name: str = Field(pattern=r"^[a-z_]{1,8}$")
     enter: str
     share: float = Field(gt=0, le=1)
-    to: dict[str, float] = Field(min_length=1)  # the rest of the route, edges separated by spaces -> weight
+    to: dict[str, float] = Field(min_length=1)  # rest of the route, edges with spaces between (or none) -> weight
     trucks: bool = True
 
 

@@ -12,7 +12,7 @@ import yaml
 
 from stylesim.errors import InputError, SimulationError
 from stylesim.population import Population
-from stylesim.scenario import Scenario, load_scenario
+from stylesim.scenario import Scenario, load_scenario, scenarios
 from stylesim.simulation.sumo.episode import prepare_episode
 from stylesim.simulation.sumo.network import compiled_network
 from stylesim.simulation.sumo.options import sumo_options_of
@@ -135,3 +135,13 @@ def test_a_flow_over_an_unknown_edge_is_named(changed, tmp_path: Path) -> None:
 
     with pytest.raises(SimulationError, match="west_inn"):
         prepare_episode(changed(change), Population.load("tdbm_spectrum"), seed=0, episode=0, folder=tmp_path)
+
+
+@pytest.mark.parametrize("name", [name for name in scenarios() if load_scenario(name).backend == "sumo"])
+def test_lanes_inside_junctions_are_as_long_as_they_are_drawn(name: str) -> None:
+    """SUMO gives all lanes of an edge one length; traffic seems to brake where one is drawn shorter."""
+    network = read_network(compiled(load_scenario(name), 16.0))
+    for lane in network.road.lanes:
+        if lane.lane_id.startswith(":"):
+            drawn = np.hypot(*np.diff(lane.centre_line_m.astype(np.float64), axis=0).T).sum()
+            assert drawn == pytest.approx(network.length_m[lane.lane_id], abs=0.005), lane.lane_id
