@@ -45,6 +45,8 @@ class Segments:
 
     def slices(self) -> Iterator[slice]:
         """The rows of each segment."""
+        if not len(self.starts):
+            return
         ends = np.append(self.starts[1:], len(self.first))
         for start, end in zip(self.starts.tolist(), ends.tolist(), strict=True):
             yield slice(start, end)
