@@ -18,7 +18,7 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Int32
 
-from stylesim.simulation.sumo.episode import DT_S, EpisodeFiles
+from stylesim.simulation.sumo.episode import DT_S, Episode
 from stylesim.simulation.sumo.lateral import offsets, slides, without_slide
 from stylesim.simulation.sumo.paths import Points, Rows, Segments, directions, points_behind
 from stylesim.simulation.sumo.recorder import RawLog
@@ -38,7 +38,7 @@ class Bodies:
     segments: Segments
 
 
-def bodies_of(log: RawLog, files: EpisodeFiles) -> Bodies:
+def bodies_of(log: RawLog, files: Episode) -> Bodies:
     """Every row of the log as a body."""
     order = np.argsort(log.driver, kind="stable")
     driver, step, front = log.driver[order], log.step[order], log.front_m[order]

@@ -25,17 +25,13 @@ DT_S = 0.1
 TWIN_TYPE = "/twin"  # what the id of a driver's second vehicle type ends in
 
 
-@dataclass(frozen=True)
-class EpisodeFiles:
-    """Everything that decides how an episode runs, but for the drivers' answers to yellow lights."""
+@dataclass(frozen=True, kw_only=True)
+class Episode:
+    """Who drives where and when in one episode: what decisions, tracks and flags depend on, wherever SUMO runs."""
 
-    network_path: Path
-    route_path: Path
-    additional_path: Path | None  # the signal programmes, where the scenario has plans for signals
     drivers: Mapping[str, Driver]
     parameters: Mapping[str, float]
     network: RoadNetwork
-    options: SumoOptions
     seed: int
     episode: int
     warm_up_s: float
@@ -65,6 +61,16 @@ class EpisodeFiles:
     def end_s(self) -> float:
         """When the episode ends on SUMO's clock."""
         return self.warm_up_s + self.duration_s
+
+
+@dataclass(frozen=True, kw_only=True)
+class EpisodeFiles(Episode):
+    """Everything that decides how an episode runs, but for the drivers' answers to yellow lights."""
+
+    network_path: Path
+    route_path: Path
+    additional_path: Path | None  # the signal programmes, where the scenario has plans for signals
+    options: SumoOptions
 
 
 def prepare_episode(

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from jaxtyping import Float64, Int32
 
-from stylesim.simulation.sumo.episode import DT_S, EpisodeFiles
+from stylesim.simulation.sumo.episode import DT_S, Episode
 from stylesim.simulation.sumo.paths import Points, Rows, Segments
 from stylesim.simulation.sumo.recorder import RawLog
 from stylesim.simulation.wander import ROOM_BEYOND_LANE_M, WanderSwitch, lateral_wander, smoothed_slide
@@ -38,7 +38,7 @@ def without_slide(step_m: Points, slide_m: Rows) -> Points:
 
 def offsets(
     log: RawLog,
-    files: EpisodeFiles,
+    files: Episode,
     driver: Int32[np.ndarray, " row"],
     step: Int32[np.ndarray, " row"],
     speed_mps: Rows,
@@ -64,7 +64,7 @@ def offsets(
     return wander[driver, frame] + _lane_change_lag(driver, frame, speed, slide_m)
 
 
-def _switch(log: RawLog, files: EpisodeFiles, begin: Int32[np.ndarray, " driver"]) -> WanderSwitch | None:
+def _switch(log: RawLog, files: Episode, begin: Int32[np.ndarray, " driver"]) -> WanderSwitch | None:
     """The change of the twin's driver on the way, on the clock of its rows."""
     step, twin = files.switch_step, files.twin
     if step < 0 or twin is None or twin.driver not in log.driver_ids:

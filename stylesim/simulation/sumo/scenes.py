@@ -9,7 +9,7 @@ from stylesim.overlaps import overlaps
 from stylesim.scene import Scene
 from stylesim.signals import Signals
 from stylesim.simulation.sumo.bodies import Bodies, bodies_of
-from stylesim.simulation.sumo.episode import DT_S, EpisodeFiles
+from stylesim.simulation.sumo.episode import DT_S, Episode
 from stylesim.simulation.sumo.events import flags_of
 from stylesim.simulation.sumo.recorder import RawLog
 from stylesim.simulation.sumo.signals import signal_log
@@ -19,7 +19,7 @@ from stylesim.tracks import TrackFlag, Tracks
 SETTLING_S = 3.0  # after insertion, not logged: SUMO's vehicles find their speed and lane in that time
 
 
-def scene_of(log: RawLog, decisions: list[DecisionEvent], files: EpisodeFiles, *, name: str) -> Scene:
+def scene_of(log: RawLog, decisions: list[DecisionEvent], files: Episode, *, name: str) -> Scene:
     """The scene of the frames after the warm-up; the first 3 s after each vehicle's insertion are not logged."""
     warm, frames = round(files.warm_up_s / DT_S), round(files.duration_s / DT_S)
     signals = _signals(log, files, start=warm, frames=frames)
@@ -41,13 +41,13 @@ def scene_of(log: RawLog, decisions: list[DecisionEvent], files: EpisodeFiles, *
     )
 
 
-def _signals(log: RawLog, files: EpisodeFiles, *, start: int, frames: int) -> Signals | None:
+def _signals(log: RawLog, files: Episode, *, start: int, frames: int) -> Signals | None:
     shown = {name: (log.texts, log.shown[start : start + frames]) for name, log in log.signals.items()}
     return signal_log(files.network, shown)
 
 
 def _tracks(
-    log: RawLog, decisions: list[DecisionEvent], files: EpisodeFiles, signals: Signals | None, *, warm: int, frames: int
+    log: RawLog, decisions: list[DecisionEvent], files: Episode, signals: Signals | None, *, warm: int, frames: int
 ) -> tuple[Tracks, dict[str, int]]:
     """The tracks of the drivers with a logged frame, and what is counted of them."""
     bodies = bodies_of(log, files)
@@ -65,7 +65,7 @@ def _tracks(
 
 def _dense(
     bodies: Bodies,
-    files: EpisodeFiles,
+    files: Episode,
     driver_ids: tuple[str, ...],
     flags: Int32[np.ndarray, " driver"],
     *,
@@ -109,7 +109,7 @@ def _counts(tracks: Tracks, log: RawLog, warm: int) -> dict[str, int]:
 
 
 def _overlap_counts(
-    bodies: Bodies, files: EpisodeFiles, driver_ids: tuple[str, ...], logged: Bool[np.ndarray, " row"]
+    bodies: Bodies, files: Episode, driver_ids: tuple[str, ...], logged: Bool[np.ndarray, " row"]
 ) -> dict[str, int]:
     """Pairs of drivers whose logged boxes overlap at least once, and in how many frames."""
     size = np.array([[files.drivers[name].length_m, files.drivers[name].width_m] for name in driver_ids]).reshape(-1, 2)

@@ -8,7 +8,7 @@ Changes that the route needs stay allowed.
 from __future__ import annotations
 
 from stylesim.simulation.sumo.engine import SumoApi
-from stylesim.simulation.sumo.episode import EpisodeFiles
+from stylesim.simulation.sumo.episode import Episode
 
 SOLID_LINE_M = 80.0  # chosen, because queues of the shipped scenarios are mostly shorter
 EVERY_STEPS = 5  # a car moves 10 m at most in that time
@@ -19,7 +19,7 @@ NEEDED_ONLY = 0b011000000101  # without gain of speed and without keeping right
 class StopZone:
     """Call `before_step` ahead of every simulation step."""
 
-    def __init__(self, sumo: SumoApi, files: EpisodeFiles) -> None:
+    def __init__(self, sumo: SumoApi, files: Episode) -> None:
         self._sumo = sumo
         self._length_m = {lane: files.network.length_m[lane] for lane in files.network.controlled_lanes()}
         self._drivers = files.drivers

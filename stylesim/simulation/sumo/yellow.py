@@ -18,7 +18,7 @@ from dataclasses import dataclass
 
 from stylesim.simulation.driving import YellowDecision, decide_at_yellow
 from stylesim.simulation.sumo.engine import SumoApi
-from stylesim.simulation.sumo.episode import EpisodeFiles
+from stylesim.simulation.sumo.episode import Episode
 from stylesim.simulation.sumo.signals import ONSET_S
 
 AFTER_YELLOW = "junctionModel.jmDriveAfterYellowTime"
@@ -42,7 +42,7 @@ class DecisionEvent:
 class YellowController:
     """Watches the signals of one episode; call `before_step` ahead of every simulation step."""
 
-    def __init__(self, sumo: SumoApi, files: EpisodeFiles) -> None:
+    def __init__(self, sumo: SumoApi, files: Episode) -> None:
         self._sumo, self._files = sumo, files
         self._shown = dict.fromkeys(files.signals, "")
         self._lane_of_link = {(link.signal, link.index): link.lane for link in files.network.links}
