@@ -75,7 +75,7 @@ class Road:
 
     lanes: tuple[Lane, ...]
     source: str = "map"
-    crosswalks_m: tuple[Float[np.ndarray, "corner 2"], ...] = ()
+    crosswalks_m: tuple[Float[np.ndarray, "_ 2"], ...] = ()
 
     def __post_init__(self) -> None:
         """Check that lane ids are unique and `source` is known."""

@@ -98,4 +98,5 @@ def _signals(recording: Recording, first: int, n_frames: int) -> Signals | None:
     if log is None:
         return None
     times = (first + np.arange(n_frames)) * recording.dt_s
-    return Signals(signal_id=log.signal_id, lane_id=((),) * len(log.signal_id), state=log.at(times))
+    links = log.lane_id or ((),) * len(log.signal_id)
+    return Signals(signal_id=log.signal_id, lane_id=links, state=log.at(times))

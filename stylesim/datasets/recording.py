@@ -21,6 +21,7 @@ class SignalLog:
     signal_id: tuple[str, ...]
     state: Int8[np.ndarray, "signal event"]
     stale_s: float  # a state older than this is unknown
+    lane_id: tuple[tuple[str, ...], ...] = ()  # the lanes that each light controls; empty: no link is known
 
     def at(self, time_s: Float64[np.ndarray, " time"]) -> Int8[np.ndarray, "signal time"]:
         """The state last logged at or before each time; UNKNOWN before the first log and where it is stale.
