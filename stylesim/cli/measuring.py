@@ -146,6 +146,7 @@ def fidelity(
     corpus: Path = typer.Argument(help="A generated corpus."),
     scenario: list[str] = typer.Option([], help="Only these scenarios, repeatable; without it all."),
     out: Path | None = typer.Option(None, "--out", help="Write every figure as JSON to this file."),
+    report: Path | None = typer.Option(None, "--report", help="Write an HTML page with figures to this file."),
     robustness: bool = typer.Option(
         True, help="Also measure the same drivers with other smoothers, windows, weights and radii (10 more passes)."
     ),
@@ -158,24 +159,30 @@ def fidelity(
 
     if out is not None and out.suffix != ".json":
         raise InputError(f"--out {out}: figures are written as .json")
+    if report is not None and report.suffix != ".html":
+        raise InputError(f"--report {report}: a report is an .html file")
     opened = Corpus(corpus)
     with progress_bar("measuring", "scenes") as progress:
         last = [""]
 
-        def report(stage: str, done: int, total: int) -> None:
+        def tell(stage: str, done: int, total: int) -> None:
             if stage != last[0]:
                 last[0] = stage
                 progress.stage(stage, "scenes")
             progress(done, total)
 
-        found = run(opened, scenarios=tuple(scenario), with_robustness=robustness, seed=seed, progress=report)
+        found = run(opened, scenarios=tuple(scenario), with_robustness=robustness, seed=seed, progress=tell)
     show_fidelity(found)
     if out is not None:
         text = json.dumps(found.to_dict(), indent=1, sort_keys=True, allow_nan=False, ensure_ascii=False)
         write_whole(out, text.encode())
         say(f"{out}")
+    if report is not None:
+        from stylesim.report.fidelity_page import save_fidelity
+
+        say(f"{save_fidelity(found, report)}")
 
 
 def add_to(app: typer.Typer) -> None:
     """Register the verb."""
-    app.command("fidelity", epilog="Example: `stylesim fidelity runs/sim --out fidelity.json`")(fidelity)
+    app.command("fidelity", epilog="Example: `stylesim fidelity runs/sim --report fidelity.html`")(fidelity)

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from jaxtyping import Bool
+from jaxtyping import Bool, Float64
 
 from stylesim.corpus import Corpus
 from stylesim.evaluation.commanded import EXCLUSIONS, UNDETERMINED_REASON, CommandedDrivers, commanded_drivers
@@ -46,6 +46,9 @@ class Fidelity:
     excluded: Mapping[str, Mapping[str, int]]
     outcomes: Mapping[str, Mapping[str, int]]
     unseen: int
+    knob: Float64[np.ndarray, " driver"]  # of the judged, in order, as are the next two
+    measured_a: Float64[np.ndarray, " driver"]  # by sim-reference, whole trips; NaN where undetermined
+    commanded: tuple[str, ...]
     about: Mapping[str, Any]
 
     def of(self, *, method: str = "tdbm", reference: str = DEFAULT_REFERENCE, span: str = "track") -> list[Agreement]:
@@ -60,7 +63,7 @@ class Fidelity:
         return lost / asked if asked else float("nan")
 
     def to_dict(self) -> dict[str, Any]:
-        """Plain JSON values."""
+        """Plain JSON values, without single drivers."""
         return {
             "format": FORMAT,
             "schema_version": SCHEMA_VERSION,
@@ -121,6 +124,9 @@ def fidelity(
         excluded=excluded,
         outcomes=_nested(people.outcomes),
         unseen=people.unseen,
+        knob=people.knob[people.judged],
+        measured_a=labels.aggressiveness.astype(np.float64),
+        commanded=tuple(STYLE_CLASSES[place] for place in people.commanded[people.judged].tolist()),
         about=_about(corpus, shipped, scenarios, seed=seed, draws=draws),
     )
 
