@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Protocol, runtime_checkable
 
 import numpy as np
-from jaxtyping import Float, Int
+from jaxtyping import Bool, Float, Int
 
 from stylesim.arrays import frozen
 from stylesim.scene import Scene
@@ -52,10 +53,37 @@ class Forecast:
 
 @runtime_checkable
 class Forecaster(Protocol):
-    """Anything that forecasts. One `Forecast` per task, drivers in the order of `task.agent_index`."""
+    """Anything that forecasts. One `Forecast` per task, drivers in the order of `task.agent_index`.
+
+    Two things more may be there: `horizon_s`, how far it can look (everybody is then judged up to the shortest one),
+    and `covers(task) -> Bool[driver]`, whom it can speak of (see `Covers`).
+    """
 
     name: str
 
     def predict(self, tasks: Sequence[ForecastTask]) -> list[Forecast]:
         """Forecast every task."""
         ...
+
+
+@runtime_checkable
+class Covers(Protocol):
+    """A forecaster that has no answer for some: predictions from a file, a model for cars alone."""
+
+    def covers(self, task: ForecastTask) -> Bool[np.ndarray, " driver"]:
+        """True for the drivers of the task that it can forecast."""
+        ...
+
+
+def horizon_s(forecaster: Forecaster) -> float:
+    """How far the forecaster can look, in seconds; infinity where it does not say."""
+    return float(getattr(forecaster, "horizon_s", math.inf))
+
+
+def covered(forecasters: Sequence[Forecaster], task: ForecastTask) -> Bool[np.ndarray, " driver"]:
+    """The drivers of a task that every one of the forecasters can speak of."""
+    result = np.ones(len(task.agent_index), bool)
+    for forecaster in forecasters:
+        if isinstance(forecaster, Covers):
+            result &= forecaster.covers(task)
+    return result

@@ -99,7 +99,9 @@ def train(
 
 def evaluate(
     forecaster: list[str] = typer.Argument(
-        help="Model folders or baselines (constant_velocity, constant_turn_rate), and last the corpus."
+        help="Forecasters, and last the corpus. A forecaster is a model folder, a baseline (constant_velocity, "
+        "constant_turn_rate, lane_following, idm_rollout, kinematic_fan), an entry point pkg.module:factory, a model "
+        "file (.pt, .pt2, .onnx), or a file of predictions (Argoverse 2 .parquet, Waymo .binproto or .tar.gz)."
     ),
     by: str = typer.Option(
         "tdbm",
@@ -107,15 +109,21 @@ def evaluate(
         "scenario, source, kind, commanded; crossed with *: tdbm*scenario.",
     ),
     split: str = typer.Option("test", help="Split to evaluate: train, val, test, or all for the whole corpus."),
+    history: float = typer.Option(5.0, min=0.1, help="Seconds of history that the forecasters see."),
+    future: float = typer.Option(6.0, min=0.1, help="Seconds to forecast; cut to the shortest horizon among them."),
+    stride: float = typer.Option(3.0, min=0.1, help="Seconds from one t0 of a scene to the next."),
     seed: int = typer.Option(0, min=0, help="Of the bootstrap."),
     out: Path = typer.Option(..., "--out", help="Folder of the report; must not exist."),
 ) -> None:
     """Evaluate forecasters by style: tables with n and 95 % intervals, JSON, Markdown, Parquet and an HTML report."""
     from stylesim.corpus import Corpus
     from stylesim.corpus.files import new_folder
+    from stylesim.evaluation.evaluate import common_spec
+    from stylesim.forecast import horizon_s
     from stylesim.forecasting.opening import open_forecaster
     from stylesim.report.evaluate import evaluate as run
     from stylesim.report.tables import error_table
+    from stylesim.windows import WindowSpec
 
     if len(forecaster) < 2:
         raise InputError("give at least one forecaster and, last, the corpus")
@@ -125,12 +133,19 @@ def evaluate(
     *names, corpus_path = forecaster
     corpus = Corpus(corpus_path)
     view = corpus if split == "all" else corpus.split(split)
-    models = [open_forecaster(name) for name in names]
+    spec = WindowSpec(history, future, stride)
+    has_train = any(info.split == "train" for info in corpus.info)
+    train_split = (lambda: corpus.split("train")) if has_train else None
+    models = [open_forecaster(name, train=train_split, spec=spec) for name in names]
+    judged = common_spec(models, spec)
+    if judged.future_s < spec.future_s:
+        shortest = min(models, key=horizon_s).name
+        say(f"judged up to {judged.future_s:g} s, the horizon of {shortest}; {spec.future_s:g} s were asked for")
     strata = tuple(part.strip() for part in by.split(",") if part.strip())
     if not strata:
         raise InputError("--by: name at least one stratum, such as tdbm or scenario")
     with progress_bar("evaluating", "scenes") as bar:
-        report = run(models, view, by=strata, seed=seed, progress=_by_forecaster(bar))
+        report = run(models, view, by=strata, spec=spec, seed=seed, progress=_by_forecaster(bar))
     _save(report, partial, final)
     for stratum in strata:
         table = error_table(report.evaluations, stratum)

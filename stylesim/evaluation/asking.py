@@ -15,7 +15,7 @@ from jaxtyping import Bool, Float32
 from stylesim.corpus import Corpus
 from stylesim.errors import InputError
 from stylesim.evaluation.metrics import METRICS, ForecastErrors, forecast_errors
-from stylesim.forecast import Forecast, Forecaster, ForecastTask
+from stylesim.forecast import Forecast, Forecaster, ForecastTask, covered
 from stylesim.scene import Scene
 from stylesim.tracks import AgentKind
 from stylesim.windows import WindowSpec, anchor_frames, target_agents
@@ -55,8 +55,13 @@ def _identity(scene: Scene, agent: int, t0: int) -> dict[str, Any]:
     }
 
 
-def questions(scene: Scene, spec: WindowSpec, counts: Counter[str]) -> Iterator[Question]:
-    """The questions of one scene; `counts` gets what is asked and, with the reason, what is not."""
+def questions(
+    scene: Scene, spec: WindowSpec, counts: Counter[str], answering: Sequence[Forecaster] = ()
+) -> Iterator[Question]:
+    """The questions of one scene that all of `answering` can answer.
+
+    `counts` gets what is asked and, with the reason, what is not.
+    """
     history, future, _ = spec.steps(scene.tracks.dt_s)
     anchors = anchor_frames(scene, spec)
     counts["scenes"] += 1
@@ -65,17 +70,22 @@ def questions(scene: Scene, spec: WindowSpec, counts: Counter[str]) -> Iterator[
         present = scene.tracks.history(t0, history).valid[:, -1]
         able = target_agents(scene, t0, spec, need_future=False)
         chosen = target_agents(scene, t0, spec)
-        counts["windows"] += len(chosen)
         counts["not a motor vehicle"] += int((present & ~scene.tracks.is_motor).sum())
         counts["history too short"] += int((present & scene.tracks.is_motor).sum()) - len(able)
         counts["future incomplete"] += len(able) - len(chosen)
+        past = scene.history(t0, history)
+        known = covered(answering, ForecastTask(past, chosen, future, t0))
+        if not known.all():
+            counts["not forecast by all"] += int((~known).sum())
+            chosen = chosen[known]
+        counts["windows"] += len(chosen)
         if not len(chosen):
             continue
         ahead = slice(t0 + 1, t0 + 1 + future)
         truth, valid = scene.tracks.position_m[chosen, ahead], scene.tracks.valid[chosen, ahead]
         moved = np.linalg.norm(truth - scene.tracks.position_m[chosen, t0][:, None], axis=2)
         yield Question(
-            task=ForecastTask(scene.history(t0, history), chosen, future, t0),
+            task=ForecastTask(past, chosen, future, t0),
             truth_m=truth,
             valid=valid,
             standing=np.where(valid, moved, 0.0).max(axis=1) < STANDING_M,
@@ -123,18 +133,20 @@ def ask(
     spec: WindowSpec,
     modes: int,
     batch: int,
+    beside: Sequence[Forecaster] = (),
     progress: Callable[[int, int], None] | None = None,
 ) -> tuple[pl.DataFrame, dict[str, int]]:
     """Every window of the corpus: (one row per driver and t0, counts of what was and was not asked).
 
-    `batch` tasks go to the forecaster at a time; only their scenes are in memory.
+    `batch` tasks go to the forecaster at a time; only their scenes are in memory. Whom the forecaster, or one of those
+    `beside` it, has no answer for is not asked, and counted.
     """
     counts: Counter[str] = Counter()
     frames: list[pl.DataFrame] = []
 
     def every() -> Iterator[Question]:
         for done, scene in enumerate(corpus, start=1):
-            yield from questions(scene, spec, counts)
+            yield from questions(scene, spec, counts, (forecaster, *beside))
             if progress is not None:
                 progress(done, len(corpus))
 

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
 from importlib.metadata import version
 from typing import Any
 
@@ -15,7 +16,7 @@ from stylesim.evaluation.metrics import MISS_THRESHOLD_M, MODES
 from stylesim.evaluation.results import Evaluation
 from stylesim.evaluation.slices import all_slices, driver_table
 from stylesim.evaluation.strata import check_strata, with_strata
-from stylesim.forecast import Forecaster
+from stylesim.forecast import Forecaster, horizon_s
 from stylesim.windows import WindowSpec
 
 
@@ -42,6 +43,7 @@ def evaluate(
     seed: int = 0,
     modes: int = MODES,
     batch: int = 16,
+    beside: Sequence[Forecaster] = (),
     within_site: bool = True,
     progress: Callable[[int, int], None] | None = None,
 ) -> Evaluation:
@@ -50,18 +52,21 @@ def evaluate(
     `by` holds strata: "tdbm", "kdsc" (class of the whole track), "tdbm:transposed", "history:tdbm" (class of the
     history before t0), "scenario", "source", "kind", "commanded", or a product such as "tdbm*scenario". The
     forecaster sees histories only; labels are joined to its errors afterwards. Standing agents (< 1 m in the future)
-    have a cell of their own and are in no other. `batch` tasks are given to `predict` at a time. `within_site=False`
+    have a cell of their own and are in no other. Drivers that the forecaster, or one of those `beside` it, has no
+    forecast for are not asked; a forecaster that looks less far than the future of `spec` makes it shorter, for all of
+    them alike (`about` has both lengths). `batch` tasks are given to `predict` at a time. `within_site=False`
     refuses cells of fewer than 3 units altogether. `seed` is of the bootstrap.
 
     Raises InputError for an unknown stratum, missing labels, an unknown split, a corpus without one window, or an
     answer of the forecaster that is not what was asked.
     """
-    spec = spec or WindowSpec()
+    asked = spec or WindowSpec()
+    spec = common_spec((forecaster, *beside), asked)
     view = corpus if split is None else corpus.split(split)
     if batch < 1:
         raise InputError(f"batch must be 1 or more, not {batch}")
     check_strata(view, tuple(by))
-    windows, counts = ask(forecaster, view, spec=spec, modes=modes, batch=batch, progress=progress)
+    windows, counts = ask(forecaster, view, spec=spec, modes=modes, batch=batch, beside=beside, progress=progress)
     if windows.is_empty():
         reasons = ", ".join(f"{name}: {count}" for name, count in counts.items() if count)
         raise InputError(f"{corpus.path} has no window of {spec.history_s:g} s + {spec.future_s:g} s ({reasons})")
@@ -71,9 +76,20 @@ def evaluate(
         by=tuple(by),
         slices=all_slices(windows, tuple(by), seed=seed, within_site=within_site),
         drivers=driver_table(windows),
-        about=_about(view, spec, provenance, seed=seed, modes=modes),
+        about=_about(view, spec, provenance, seed=seed, modes=modes) | {"asked_future_s": asked.future_s},
         counts=counts,
     )
+
+
+def common_spec(forecasters: Sequence[Forecaster], spec: WindowSpec) -> WindowSpec:
+    """The windows, their future cut to the shortest horizon of the forecasters; InputError if that is no step."""
+    shortest = min(forecasters, key=horizon_s)
+    reach = horizon_s(shortest)
+    if reach >= spec.future_s:
+        return spec
+    if not reach > 0:
+        raise InputError(f"forecaster {shortest.name!r} says that it can look {reach:g} s ahead; that is no forecast")
+    return replace(spec, future_s=reach)
 
 
 def _about(corpus: Corpus, spec: WindowSpec, provenance: Mapping[str, Any], *, seed: int, modes: int) -> dict[str, Any]:

@@ -16,7 +16,7 @@ TURN_WINDOW_S = 1.0  # chosen: long enough to average out heading noise, short e
 TURN_MIN_SPEED_MPS = 1.0  # chosen: below it a recorded heading turns without the vehicle turning
 
 
-def _known_at_t0(task: ForecastTask) -> Tracks:
+def known_at_t0(task: ForecastTask) -> Tracks:
     """The tracks of the task; InputError if an agent to forecast is not known at t0."""
     tracks = task.scene.tracks
     for index in task.agent_index:
@@ -28,7 +28,8 @@ def _known_at_t0(task: ForecastTask) -> Tracks:
     return tracks
 
 
-def _future_times_s(task: ForecastTask) -> Float64[np.ndarray, " time"]:
+def future_times_s(task: ForecastTask) -> Float64[np.ndarray, " time"]:
+    """Seconds from t0 to each step that is asked for."""
     return np.arange(1, task.future_steps + 1) * task.scene.tracks.dt_s
 
 
@@ -46,10 +47,10 @@ class ConstantVelocity:
         return [self._one(task) for task in tasks]
 
     def _one(self, task: ForecastTask) -> Forecast:
-        tracks = _known_at_t0(task)
+        tracks = known_at_t0(task)
         start = tracks.position_m[task.agent_index, -1].astype(np.float64)
         velocity = tracks.velocity_mps[task.agent_index, -1].astype(np.float64)
-        return _one_mode(start[:, None] + velocity[:, None] * _future_times_s(task)[None, :, None])
+        return _one_mode(start[:, None] + velocity[:, None] * future_times_s(task)[None, :, None])
 
 
 class ConstantTurnRate:
@@ -62,13 +63,13 @@ class ConstantTurnRate:
         return [self._one(task) for task in tasks]
 
     def _one(self, task: ForecastTask) -> Forecast:
-        tracks = _known_at_t0(task)
+        tracks = known_at_t0(task)
         index = task.agent_index
         start = tracks.position_m[index, -1].astype(np.float64)
         velocity = tracks.velocity_mps[index, -1].astype(np.float64)
         speed = np.hypot(velocity[:, 0], velocity[:, 1])
         rate = np.where(speed >= TURN_MIN_SPEED_MPS, turn_rate_radps(tracks)[index], 0.0)
-        t = _future_times_s(task)[None]
+        t = future_times_s(task)[None]
         # Integral of the velocity turning at `rate`: v0 times (sin, 1 - cos)(rate t) / rate, by series near 0.
         angle = rate[:, None] * t
         along = t * np.sinc(angle / np.pi)

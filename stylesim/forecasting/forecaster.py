@@ -41,6 +41,11 @@ class TrainedForecaster:
         return self.network.config
 
     @property
+    def horizon_s(self) -> float:
+        """How far it can look, in seconds."""
+        return self.config.inputs.future_steps * self.config.inputs.dt_s
+
+    @property
     def styles(self) -> tuple[str, ...]:
         """The styles that `predict(style=...)` knows; () for a model without style."""
         return () if self.conditioner is None else self.conditioner.cells.classes

@@ -82,10 +82,12 @@ def evaluate(
     if len(set(names)) < len(names):
         raise InputError(f"two forecasters have the same name: {', '.join(names)}")
     view = corpus if split is None else corpus.split(split)
+    # all get the same questions: what one of them cannot answer, none is asked
     evaluations = tuple(
         one_forecaster.evaluate(
             forecaster,
             view,
+            beside=several,
             by=tuple(by),
             spec=spec,
             seed=seed,
