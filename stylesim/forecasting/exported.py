@@ -12,6 +12,7 @@ modes, or (modes, probability). TorchScript and exported programs are code of th
 from __future__ import annotations
 
 import json
+import zipfile
 from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
@@ -72,6 +73,8 @@ def model_file(path: Path) -> ArrayForecaster:
 def _torch(path: Path) -> _Call:
     import torch
 
+    if not zipfile.is_zipfile(path):
+        raise InputError(f"{path} is no model that torch can load: it is no zip archive")
     try:
         if path.suffix == ".pt2":
             module: Any = torch.export.load(str(path)).module()

@@ -10,7 +10,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -19,10 +19,13 @@ import torch
 
 from stylesim.errors import InputError
 from stylesim.forecast import Forecast, Forecaster, ForecastTask
+from stylesim.forecasting.arrays import FOOT_M, ArrayForecaster
 from stylesim.forecasting.baselines import ConstantTurnRate, ConstantVelocity
 from stylesim.forecasting.config import InputConfig, model_config
+from stylesim.forecasting.fan import KinematicFan
 from stylesim.forecasting.forecaster import TrainedForecaster
 from stylesim.forecasting.model import ForecastNetwork
+from stylesim.forecasting.road_baselines import IdmRollout, LaneFollowing
 from stylesim.scene import Scene
 from stylesim.windows import WindowSpec, target_agents
 from tests.conftest import make_scene
@@ -133,3 +136,36 @@ class TestTrainedForecaster(ForecasterContract):
         network = ForecastNetwork(model_config("tiny", InputConfig.of(SPEC, 0.1)))
         network.intention_mps2.normal_()
         return TrainedForecaster("tiny", network, None)
+
+
+class TestLaneFollowing(ForecasterContract):
+    @pytest.fixture
+    def forecaster(self) -> Forecaster:
+        return LaneFollowing()
+
+
+class TestIdmRollout(ForecasterContract):
+    @pytest.fixture
+    def forecaster(self) -> Forecaster:
+        return IdmRollout()
+
+
+class TestKinematicFan(ForecasterContract):
+    @pytest.fixture
+    def forecaster(self) -> Forecaster:
+        return KinematicFan().fit([make_scene("a", n_agents=9), make_scene("b", n_agents=9, seed=1)], SPEC)
+
+
+class TestArrayForecaster(ForecasterContract):
+    """A foreign model at 2 Hz, in feet, without a map."""
+
+    @pytest.fixture
+    def forecaster(self) -> Forecaster:
+        return ArrayForecaster(
+            "feet", constant_velocity_in_feet, dt_s=0.5, history_s=2.0, future_s=4.0, unit_m=FOOT_M, road=False
+        )
+
+
+def constant_velocity_in_feet(arrays: Mapping[str, np.ndarray]) -> np.ndarray:
+    velocity = arrays["agent"][:, 0, -1, 2:4]
+    return velocity[:, None] * (0.5 * np.arange(1, 9))[:, None]

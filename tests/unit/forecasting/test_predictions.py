@@ -1,0 +1,180 @@
+from __future__ import annotations
+
+import gzip
+import io
+import struct
+import tarfile
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import polars as pl
+import pytest
+
+from stylesim.errors import InputError
+from stylesim.evaluation import evaluate as one
+from stylesim.evaluation.metrics import forecast_errors
+from stylesim.forecast import ForecastTask
+from stylesim.forecasting.baselines import ConstantVelocity
+from stylesim.forecasting.opening import open_forecaster
+from stylesim.report.evaluate import evaluate
+from stylesim.scene import Scene
+from stylesim.windows import WindowSpec
+from tests.conftest import make_scene
+from tests.unit.evaluation import small_world
+
+
+def cut(scene: Scene, agents: list[int], t0: int = 49, steps: int = 60) -> ForecastTask:
+    return ForecastTask(scene.history(t0, 50), np.array(agents), steps, t0)
+
+
+def truth(scene: Scene, agent: int, *, every: int = 1, steps: int = 60, t0: int = 49) -> np.ndarray:
+    """The true future in the source's frame."""
+    ahead = np.arange(t0 + every, t0 + 1 + steps, every)
+    return scene.tracks.position_m[agent, ahead].astype(np.float64) + scene.tracks.origin_m
+
+
+def av2_file(path: Path, scene: Scene, agents: list[int], *, t0: int | None = None) -> Path:
+    rows = []
+    for agent in agents:
+        for mode, chance in enumerate((0.25, 0.75)):
+            where = truth(scene, agent, t0=49 if t0 is None else t0) + 5.0 * mode
+            rows.append((scene.source_scenario_id, scene.tracks.agent_id[agent], chance, where[:, 0], where[:, 1]))
+    columns = ["scenario_id", "track_id", "probability", "predicted_trajectory_x", "predicted_trajectory_y"]
+    table = pl.DataFrame({name: [row[i] for row in rows] for i, name in enumerate(columns)}, strict=False)
+    if t0 is not None:
+        table = table.with_columns(pl.lit(t0).alias("t0_frame"))
+    table.write_parquet(path)
+    return path
+
+
+def field(number: int, payload: bytes) -> bytes:
+    return bytes([number << 3 | 2]) + varint(len(payload)) + payload
+
+
+def varint(value: int) -> bytes:
+    out = b""
+    while value > 0x7F:
+        out += bytes([value & 0x7F | 0x80])
+        value >>= 7
+    return out + bytes([value])
+
+
+def waymo_bytes(scene: Scene, agents: list[int], *, joint: bool = False) -> bytes:
+    """A MotionChallengeSubmission by the published field numbers."""
+
+    def trajectory(agent: int) -> bytes:
+        where = truth(scene, agent, every=5).astype("<f4")
+        return field(2, where[:, 0].tobytes()) + field(3, where[:, 1].tobytes())
+
+    def confidence(number: int, value: float) -> bytes:
+        return bytes([number << 3 | 5]) + struct.pack("<f", value)
+
+    ids = [int(scene.tracks.agent_id[agent].split("-")[1]) for agent in agents]
+    if joint:
+        objects = b"".join(
+            field(2, b"\x08" + varint(i) + field(2, trajectory(agent))) for i, agent in zip(ids, agents, strict=True)
+        )
+        body = field(3, field(1, objects + confidence(3, 0.5)))
+    else:
+        objects = b"".join(
+            field(1, b"\x08" + varint(i) + field(2, field(1, trajectory(agent)) + confidence(2, 3.0)))
+            for i, agent in zip(ids, agents, strict=True)
+        )
+        body = field(2, objects)
+    scenario = field(1, scene.source_scenario_id.encode()) + body
+    return field(3, b"me@example.org") + field(1, scenario)
+
+
+@pytest.fixture
+def recorded() -> Scene:
+    scene = make_scene(n_agents=4, n_frames=130)
+    ids = tuple(f"c-{i}" for i in range(4))
+    tracks = replace(scene.tracks, agent_id=ids, origin_m=np.array([1000.0, -2000.0]))  # Waymo's frames are local
+    return replace(scene, source_scenario_id="abc", t0_frame=49, tracks=tracks)
+
+
+def numbered(scene: Scene) -> Scene:
+    """Waymo's track ids are numbers."""
+    return replace(scene, tracks=replace(scene.tracks, agent_id=tuple(str(i) for i in range(4))))
+
+
+def test_an_argoverse_file_is_found_and_moved_into_the_scenes_frame(tmp_path: Path, recorded: Scene) -> None:
+    forecaster = open_forecaster(str(av2_file(tmp_path / "mine.parquet", recorded, [0, 2])))
+    assert forecaster.name == "mine"
+    assert forecaster.covers(cut(recorded, [0, 1, 2])).tolist() == [True, False, True]
+    forecast = forecaster.predict([cut(recorded, [2, 0])])[0]
+    np.testing.assert_allclose(forecast.probability, [[0.25, 0.75]] * 2)
+    np.testing.assert_allclose(forecast.mode_m[1, 0], recorded.tracks.position_m[0, 50:110], atol=1e-3)
+    with pytest.raises(InputError, match="no prediction of agent 'c-1'"):
+        forecaster.predict([cut(recorded, [1])])
+
+
+def test_a_t0_column_keeps_the_times_apart(tmp_path: Path, recorded: Scene) -> None:
+    forecaster = open_forecaster(str(av2_file(tmp_path / "mine.parquet", recorded, [0], t0=60)))
+    assert forecaster.covers(cut(recorded, [0], t0=60)).tolist() == [True]
+    assert forecaster.covers(cut(recorded, [0], t0=49)).tolist() == [False]
+
+
+@pytest.mark.parametrize("joint", [False, True])
+@pytest.mark.parametrize("packing", ["plain", "gz", "tar.gz"])
+def test_a_waymo_file_is_at_two_hertz(tmp_path: Path, recorded: Scene, joint: bool, packing: str) -> None:
+    data = waymo_bytes(recorded, [0, 3], joint=joint)
+    path = tmp_path / {"plain": "w.binproto", "gz": "w.gz", "tar.gz": "w.tar.gz"}[packing]
+    if packing == "plain":
+        path.write_bytes(data)
+    elif packing == "gz":
+        path.write_bytes(gzip.compress(data))
+    else:
+        with tarfile.open(path, "w:gz") as archive:
+            member = tarfile.TarInfo("../../climbing.bin")  # read in memory: its name leads nowhere
+            member.size = len(data)
+            archive.addfile(member, io.BytesIO(data))
+    scene = numbered(recorded)
+    forecaster = open_forecaster(str(path))
+    assert forecaster.covers(cut(scene, [0, 1, 3])).tolist() == [True, False, True]
+    forecast = forecaster.predict([cut(scene, [0, 3])])[0]
+    at = np.arange(4, 60, 5)  # 0.5 s, 1.0 s, ...: exact there, linear between
+    np.testing.assert_allclose(forecast.mode_m[:, 0, at], scene.tracks.position_m[[0, 3]][:, 50 + at], atol=1e-3)
+    error = forecast_errors(forecast.mode_m, forecast.probability, scene.tracks.position_m[[0, 3], 50:110])
+    assert error.min_ade_m.max() < 0.05
+
+
+def test_damaged_files_are_named(tmp_path: Path, recorded: Scene) -> None:
+    data = waymo_bytes(recorded, [0])
+    for name, content in {"a.binproto": data[:-3], "b.binproto": b"\xff" * 30, "c.gz": b"\x1f\x8bxx"}.items():
+        (tmp_path / name).write_bytes(content)
+        with pytest.raises(InputError, match=name):
+            open_forecaster(str(tmp_path / name))
+    (tmp_path / "d.parquet").write_bytes(b"PAR1")
+    with pytest.raises(InputError, match="no Parquet"):
+        open_forecaster(str(tmp_path / "d.parquet"))
+    good = pl.read_parquet(av2_file(tmp_path / "e.parquet", recorded, [0]))
+    good.drop("probability").write_parquet(tmp_path / "f.parquet")
+    with pytest.raises(InputError, match="'probability' is missing"):
+        open_forecaster(str(tmp_path / "f.parquet"))
+    good.with_columns(pl.lit(-1.0).alias("probability")).write_parquet(tmp_path / "g.parquet")
+    with pytest.raises(InputError, match="confidence of -1"):
+        open_forecaster(str(tmp_path / "g.parquet"))
+
+
+class ShortSighted(ConstantVelocity):
+    name = "short"
+    horizon_s = 3.0
+
+
+def test_all_are_judged_on_what_all_can_answer(tmp_path: Path) -> None:
+    """A file that knows two drivers of one t0, beside a baseline and a model that looks 3 s: the same questions."""
+    scenes = [small_world.scene(i) for i in range(3)]
+    corpus = small_world.write(tmp_path / "c", scenes)
+    first = replace(scenes[0], source_scenario_id=scenes[0].scene_id)
+    known = open_forecaster(str(av2_file(tmp_path / "file.parquet", first, [2, 3], t0=49)))
+    report = evaluate([known, ConstantVelocity(), ShortSighted()], corpus, by=("scenario",))
+    for evaluation in report.evaluations:
+        assert evaluation.counts["windows"] == 2
+        assert evaluation.counts["not forecast by all"] > 2
+        assert evaluation.about["future_s"] == 3.0
+        assert evaluation.about["asked_future_s"] == 6.0
+    assert report.evaluations[0].drivers["min_fde_m"].max() < 1e-3  # it was given the truth
+    alone = one.evaluate(ShortSighted(), corpus, by=("scenario",), spec=WindowSpec(5.0, 2.0))
+    assert alone.about["future_s"] == 2.0
