@@ -119,7 +119,7 @@ def test_a_t0_column_keeps_the_times_apart(tmp_path: Path, recorded: Scene) -> N
 @pytest.mark.parametrize("joint", [False, True])
 @pytest.mark.parametrize("packing", ["plain", "gz", "tar.gz"])
 def test_a_waymo_file_is_at_two_hertz(tmp_path: Path, recorded: Scene, joint: bool, packing: str) -> None:
-    data = waymo_bytes(recorded, [0, 3], joint=joint)
+    data = waymo_bytes(recorded, [0, 2], joint=joint)
     path = tmp_path / {"plain": "w.binproto", "gz": "w.gz", "tar.gz": "w.tar.gz"}[packing]
     if packing == "plain":
         path.write_bytes(data)
@@ -132,11 +132,11 @@ def test_a_waymo_file_is_at_two_hertz(tmp_path: Path, recorded: Scene, joint: bo
             archive.addfile(member, io.BytesIO(data))
     scene = numbered(recorded)
     forecaster = open_forecaster(str(path))
-    assert forecaster.covers(cut(scene, [0, 1, 3])).tolist() == [True, False, True]
-    forecast = forecaster.predict([cut(scene, [0, 3])])[0]
+    assert forecaster.covers(cut(scene, [0, 1, 2])).tolist() == [True, False, True]
+    forecast = forecaster.predict([cut(scene, [0, 2])])[0]
     at = np.arange(4, 60, 5)  # 0.5 s, 1.0 s, ...: exact there, linear between
-    np.testing.assert_allclose(forecast.mode_m[:, 0, at], scene.tracks.position_m[[0, 3]][:, 50 + at], atol=1e-3)
-    error = forecast_errors(forecast.mode_m, forecast.probability, scene.tracks.position_m[[0, 3], 50:110])
+    np.testing.assert_allclose(forecast.mode_m[:, 0, at], scene.tracks.position_m[[0, 2]][:, 50 + at], atol=1e-3)
+    error = forecast_errors(forecast.mode_m, forecast.probability, scene.tracks.position_m[[0, 2], 50:110])
     assert error.min_ade_m.max() < 0.05
 
 
