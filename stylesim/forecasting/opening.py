@@ -54,6 +54,10 @@ def open_forecaster(
 def _from_file(path: Path) -> Forecaster:
     from stylesim.forecasting.exported import SUFFIXES, model_file
 
+    if path.suffix == ".pt" and not path.with_suffix(".json").is_file():
+        from stylesim.forecasting.checkpoint import load
+
+        return load(path)  # a checkpoint of ours by its file, or refused as none
     if path.suffix in SUFFIXES:
         return model_file(path)
     if path.suffix == AV2_SUFFIX:

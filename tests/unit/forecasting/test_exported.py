@@ -89,7 +89,7 @@ def test_a_model_file_forecasts_as_the_model_did(tmp_path: Path, name: str, writ
 def test_what_is_wrong_with_a_model_file_is_named(tmp_path: Path) -> None:
     path = tmp_path / "m.pt2"
     path.write_bytes(b"not a model")
-    with pytest.raises(InputError, match=r"needs m\.json beside it"):
+    with pytest.raises(InputError, match=r"needs m\.json beside"):
         open_forecaster(str(path))
     (tmp_path / "m.json").write_text("{")
     with pytest.raises(InputError, match="no JSON"):
