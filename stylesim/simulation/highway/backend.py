@@ -10,9 +10,10 @@ from stylesim.randomness import stream
 from stylesim.scenario import Scenario
 from stylesim.scene import Scene
 from stylesim.simulation.highway.lanes import road_of
+from stylesim.simulation.highway.layouts import traffic_of
 from stylesim.simulation.highway.log import TrackLog
 from stylesim.simulation.highway.spec import LOG_HZ, options_of
-from stylesim.simulation.highway.traffic import Crew, Traffic, traffic_of
+from stylesim.simulation.highway.traffic import Crew, Traffic
 from stylesim.simulation.plan import PLAIN, EpisodePlan
 from stylesim.tracks import TrackFlag, Tracks
 
@@ -20,7 +21,7 @@ SOURCE = "highway_env"
 
 
 class HighwayBackend:
-    """Runs scenarios of the layouts `highway` and `intersection`; holds nothing between episodes."""
+    """Runs scenarios of every layout of `spec`; holds nothing between episodes."""
 
     name = "highway"
 
@@ -46,7 +47,7 @@ class HighwayBackend:
         for vehicle in traffic.road.vehicles:
             vehicle.emergency_braked = False  # what happens in the log counts
         for _ in range(n_frames):
-            log.add(traffic.road.vehicles)
+            log.add(traffic.logged())
             for _ in range(options.simulation_hz // LOG_HZ):
                 traffic.advance()
         tracks = log.tracks(set(traffic.removed))
@@ -78,4 +79,5 @@ def _counts(tracks: Tracks, traffic: Traffic, log: TrackLog, *, removed_before_l
         "removed_crashed": reasons["crashed"],
         "removed_off_road": reasons["off_road"],
         "removed_before_log": removed_before_log,
+        **{name: int(number) for name, number in sorted(traffic.counts.items())},
     }

@@ -15,9 +15,9 @@ from highway_env.road.road import RoadNetwork
 from jaxtyping import Float
 
 from stylesim.road import Lane, Road
+from stylesim.simulation.highway.graph import joins
 
 STRAIGHT_M = 20.0  # spacing of centre line points: straights
-JOINT_M = 0.5  # chosen: lanes whose ends are nearer than this are one path
 CURVED_M = 1.0  # and everything else; the error on a curve of radius 9 m is then 1.4 cm
 
 
@@ -34,11 +34,6 @@ def flipped(points: Float[np.ndarray, "*any 2"]) -> Float[np.ndarray, "*any 2"]:
 def _side(lane: Any, along: Float[np.ndarray, " point"], share: float) -> Float[np.ndarray, "point 2"]:
     """Points at `share` of the width to the right of the centre line."""
     return flipped(np.array([lane.position(s, share * lane.width_at(s)) for s in along]))
-
-
-def _joins(lane: Any, following: Any) -> bool:
-    """True where one lane goes on in the other; highway-env's exits and entries share a node without touching."""
-    return bool(np.linalg.norm(lane.position(lane.length, 0.0) - following.position(0.0, 0.0)) < JOINT_M)
 
 
 def road_of(network: RoadNetwork, *, junction_nodes: str = "") -> Road:
@@ -66,7 +61,7 @@ def road_of(network: RoadNetwork, *, junction_nodes: str = "") -> Road:
                 successors=tuple(
                     lane_id((end, onward, min(number, len(following) - 1)))
                     for onward, following in network.graph.get(end, {}).items()
-                    if _joins(lane, following[min(number, len(following) - 1)])
+                    if joins(lane, following[min(number, len(following) - 1)])
                 ),
                 left_neighbour=lane_id((start, end, number - 1)) if number > 0 else "",
                 right_neighbour=lane_id((start, end, number + 1)) if number + 1 < beside else "",

@@ -46,35 +46,6 @@ def stopping_m(speed_mps: float, braking_mps2: float) -> float:
     return speed_mps**2 / (2 * braking_mps2)
 
 
-def leader_beyond(vehicle: Any) -> Any:
-    """The nearest car that goes along, or stands, on the next lanes of the vehicle's route; None if there is none."""
-    best, nearest = None, math.inf
-    for start, lane in lanes_ahead(vehicle):
-        for other in vehicle.road.vehicles:
-            if other is vehicle:
-                continue
-            along, lateral = lane.local_coordinates(other.position)
-            if start + along >= nearest or start + along <= 0 or not reaches_into(lane, along, lateral, other):
-                continue
-            if other.speed < STANDING_MPS or abs(lane.local_angle(other.heading, along)) < ALIGNED_RAD:
-                best, nearest = other, start + along
-    return best
-
-
-def path_gap_m(vehicle: Any, other: Any) -> float:
-    """Distance between the centres of two cars along the path of the first, m; negative if the other is behind."""
-    routed = bool(getattr(vehicle, "route", None))
-    own = vehicle.road.network.get_lane(vehicle.target_lane_index) if routed else vehicle.lane
-    along, lateral = own.local_coordinates(other.position)
-    if not routed or reaches_into(own, along, lateral, other):
-        return float(along - own.local_coordinates(vehicle.position)[0])
-    for start, lane in lanes_ahead(vehicle):
-        ahead, aside = lane.local_coordinates(other.position)
-        if reaches_into(lane, ahead, aside, other):
-            return float(start + ahead)
-    return float(along - own.local_coordinates(vehicle.position)[0])
-
-
 def curve_speed_mps(vehicle: Any, comfort_mps2: float) -> float:
     """Speed that keeps the lateral acceleration within `comfort_mps2` in this curve and can be reached before the next.
 

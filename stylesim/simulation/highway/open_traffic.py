@@ -1,0 +1,188 @@
+"""Traffic that comes and goes: newcomers enter where trips begin, cars leave where they end."""
+
+from __future__ import annotations
+
+from collections import deque
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from stylesim.simulation.highway.lane_choice import must_change, lane_needs
+from stylesim.simulation.highway.road import StyledRoad
+from stylesim.simulation.highway.sites import Edge, Site, Trip
+from stylesim.simulation.highway.spec import HighwayOptions
+from stylesim.simulation.highway.traffic import Crew, Traffic
+from stylesim.simulation.highway.vehicle import StyledVehicle
+
+SETTLING_S = 3.0  # after insertion, not logged: cars find their speed and gap in that time (as in the other simulator)
+LAST_ENTRY_S = 27.0  # nobody enters later than that before the end, so that everybody is seen for 20 s and more
+SHORTEST_HEADWAY_S = 1.0  # between two arrivals in one lane; chosen: bold drivers follow so closely
+ENTRY_HEADWAY_S = 1.5  # who wants more than that behind its leader opens the gap after it has entered
+ENTRY_FASTER_MPS = 3.0  # at most that much faster than the leader at the entry
+LEAVES_M = 8.0  # before the end of its last lane a car has arrived
+MISSED_M = 5.0  # who is that close to the fork and not in its lane goes on where its lane leads
+
+
+@dataclass(frozen=True, eq=False)
+class _Way:
+    """A trip, with the lane changes that it asks for."""
+
+    trip: Trip
+    needs: Any
+
+    def route(self) -> list[Any]:
+        return [(*edge, None) for edge in self.trip.edges]
+
+
+class OpenTraffic(Traffic):
+    """A site with traffic through it, filled at the start so that no warm-up of a whole trip is needed."""
+
+    def __init__(self, site: Site, options: HighwayOptions, crew: Crew, *, time_s: float) -> None:
+        road = StyledRoad(network=site.network, np_random=crew.stream("road"))
+        super().__init__(road, crew, options)
+        self.junction_nodes = site.junction_nodes
+        self._site = site
+        self._ways = tuple(_Way(trip, lane_needs(road.graph, trip.edges)) for trip in site.trips)
+        self._step = 0
+        self._entered: dict[str, int] = {}  # driver -> step of its insertion; who stood there at the start is not in it
+        self._waiting: dict[Edge, deque[StyledVehicle]] = {edge: deque() for edge in site.arrivals_per_s}
+        self._due = self._arrivals(crew.stream("demand"), time_s - LAST_ENTRY_S)
+        self._fill(crew.stream("placement"))
+
+    def _arrivals(self, rng: np.random.Generator, until_s: float) -> list[tuple[float, Edge, int]]:
+        """(time, entry, way) of every arrival, latest first: random headways with a shortest one."""
+        due = []
+        for edge, rate in sorted(self._site.arrivals_per_s.items()):
+            if rate <= 0:
+                continue
+            lanes = self.road.graph.beside[edge]
+            least = min(SHORTEST_HEADWAY_S / lanes, 0.8 / rate)
+            time = 0.0
+            while True:
+                time += least + rng.exponential(1.0 / rate - least)
+                if time > until_s:
+                    break
+                due.append((time, edge, self._draw_way(edge, rng)))
+        return sorted(due, reverse=True)
+
+    def _draw_way(self, edge: Edge, rng: np.random.Generator) -> int:
+        fitting = [number for number, way in enumerate(self._ways) if way.trip.edges[0] == edge]
+        shares = np.array([self._ways[number].trip.share for number in fitting])
+        return int(fitting[int(rng.choice(len(fitting), p=shares / shares.sum()))])
+
+    def _fill(self, rng: np.random.Generator) -> None:
+        """Cars at the spacing of the arrivals along the first part of each way in."""
+        for edge, far in sorted(self._site.filled_m.items()):
+            lanes = self.road.graph.beside[edge]
+            rate = self._site.arrivals_per_s[edge] / lanes
+            if rate <= 0:
+                continue
+            limit = float(self.road.network.get_lane((*edge, 0)).speed_limit)
+            spacing = limit / rate
+            for lane in range(lanes):
+                place = 10.0 + spacing * rng.uniform(0.0, 1.0)
+                while place < far:
+                    self._stand(edge, lane, place, self._draw_way(edge, rng))
+                    place += max(spacing * rng.uniform(0.5, 1.5), SHORTEST_HEADWAY_S * limit)
+
+    def _stand(self, edge: Edge, lane: int, place_m: float, way: int) -> None:
+        """One car at a place along its way, which may lie beyond its first road."""
+        edges = self._ways[way].trip.edges
+        index = (*edge, lane)
+        for following in edges[1:]:
+            length = self.road.graph.length_m[index]
+            if place_m <= length:
+                break
+            onward = [other for other in self.road.graph.after[index] if other[:2] == following]
+            if not onward:
+                return
+            place_m, index = place_m - length, onward[0]
+        vehicle = StyledVehicle.make_on_lane(self.road, index, place_m, 0.0)
+        self._brief(vehicle, way)
+        self._crew.hire(vehicle)
+        vehicle.speed = 0.9 * vehicle.wished_speed_mps
+        self.road.vehicles.append(vehicle)
+
+    def _brief(self, vehicle: StyledVehicle, way: int) -> None:
+        vehicle.route, vehicle.needs = self._ways[way].route(), self._ways[way].needs
+
+    def logged(self) -> list[StyledVehicle]:
+        """Everybody but those who entered within the last seconds."""
+        settling = round(SETTLING_S / self._dt)
+        return [v for v in self.road.vehicles if self._step - self._entered.get(v.driver_id, -settling) >= settling]
+
+    def advance(self) -> None:
+        """One simulation step, then cars leave and enter."""
+        super().advance()
+        self._step += 1
+        self._leave()
+        while self._due and self._due[-1][0] <= self._step * self._dt:
+            _, edge, way = self._due.pop()
+            vehicle = StyledVehicle.make_on_lane(self.road, (*edge, 0), StyledVehicle.LENGTH, 0.0)
+            self._brief(vehicle, way)
+            self._crew.hire(vehicle)
+            self._waiting[edge].append(vehicle)
+        for edge, queue in self._waiting.items():
+            while queue and self._enters(edge, queue[0]):
+                queue.popleft()
+        self.counts["not_inserted"] = sum(len(queue) for queue in self._waiting.values())
+
+    def _leave(self) -> None:
+        staying = []
+        for vehicle in self.road.vehicles:
+            index = vehicle.target_lane_index
+            edge = index[:2]
+            if vehicle.needs is not None and not vehicle.crashed:
+                left = self.road.graph.length_m[index] - self.road.place(vehicle, index)[0]
+                if edge == self._last_edge(vehicle) and left < LEAVES_M:
+                    continue
+                self._miss(vehicle)
+            staying.append(vehicle)
+        if len(staying) < len(self.road.vehicles):
+            self.road.vehicles = staying
+
+    @staticmethod
+    def _last_edge(vehicle: StyledVehicle) -> Edge:
+        last: Edge = vehicle.route[-1][:2]
+        return last
+
+    def _miss(self, vehicle: StyledVehicle) -> None:
+        """Who cannot reach its lane any more takes another way that its own lane leads to."""
+        changes, left = must_change(vehicle)
+        if not changes or left > MISSED_M:
+            return
+        index = vehicle.target_lane_index
+        for way in self._ways:
+            if index in way.needs and way.needs[index][0] == 0 and index[:2] in way.trip.edges:
+                place = way.trip.edges.index(index[:2])
+                vehicle.route, vehicle.needs = way.route()[place:], way.needs
+                self.counts["missed_its_way"] += 1
+                return
+
+    def _enters(self, edge: Edge, vehicle: StyledVehicle) -> bool:
+        """Put the car on the lane of its entry where it can drive fastest, if there is room on one."""
+        assert vehicle.style is not None
+        wish, style = vehicle.wished_speed_mps, vehicle.style
+        best, fastest = None, 0.0
+        for lane in range(self.road.graph.beside[edge]):
+            index = (*edge, lane)
+            start = self.road.network.get_lane(index)
+            vehicle.position = np.array(start.position(vehicle.LENGTH, 0.0))
+            leader, gap = self.road.first_on(index)
+            speed = wish if leader is None else min(wish, leader.speed + ENTRY_FASTER_MPS)
+            headway = min(style.time_headway_s, ENTRY_HEADWAY_S)
+            if leader is not None and gap - 1.5 * vehicle.LENGTH < style.min_gap_m + headway * speed:
+                continue
+            if speed > fastest:
+                best, fastest = index, speed
+        if best is None:
+            return False
+        start = self.road.network.get_lane(best)
+        vehicle.position = np.array(start.position(vehicle.LENGTH, 0.0), np.float64)
+        vehicle.heading, vehicle.speed = float(start.heading_at(vehicle.LENGTH)), fastest
+        vehicle.lane_index, vehicle.lane = best, start
+        vehicle.target_lane_index = vehicle._steered_lane = best
+        self.road.vehicles.append(vehicle)
+        self._entered[vehicle.driver_id] = self._step
+        return True

@@ -1,0 +1,65 @@
+"""How a driver steers: a moving place in the lane, and highway-env's cascade that brings the car there."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+HEADING_S, LATERAL_S = 0.3, 1.0  # chosen: highway-env's 0.2 and 0.6 overshoot when the wheels take time to turn
+BEND_M = 0.5  # over which the curvature of the lane is taken
+LANE_ANGLE_RAD = 0.35  # chosen: largest angle to the lane; highway-env's 45 degrees spins slow cars
+WHEEL_RAD = 0.7  # chosen: lock of the front wheels; with highway-env's geometry a turning radius of 6.4 m
+WHEEL_RAD_PS = 2.0  # chosen: how fast a driver turns them; without a limit the lateral velocity jumps
+LATERAL_MPS2 = 3.8  # chosen, because 4 m/s2 is what people accept at most, and discretisation adds a little
+SLOW_MPS = 0.01  # as highway-env's not_zero
+
+
+def wrapped(angle_rad: float) -> float:
+    """The angle in [-pi, pi), rad."""
+    return (angle_rad + math.pi) % (2.0 * math.pi) - math.pi
+
+
+def steering_rad(car: Any, lane: Any, *, place_m: float, rate_mps: float, along_m: float, aside_m: float) -> float:
+    """Wheel angle that brings a car to `place_m` right of the lane's centre, moving there with `rate_mps`, rad.
+
+    highway-env's cascade of lateral speed, heading and slip, with the slip that the bend ahead asks for; bounded by
+    the lock of the wheels and by the lateral acceleration that people accept.
+    """
+    speed = car.speed if abs(car.speed) > SLOW_MPS else SLOW_MPS
+    command = (rate_mps + (place_m - aside_m) / LATERAL_S) / speed
+    reach = math.sin(LANE_ANGLE_RAD)
+    bend = wrapped(lane.heading_at(along_m + BEND_M) - lane.heading_at(along_m)) / BEND_M
+    slip_in_bend = math.asin(min(max(car.LENGTH / 2 * bend, -0.5), 0.5))
+    ahead = lane.heading_at(along_m + car.speed * HEADING_S) - slip_in_bend
+    turn = wrapped(ahead + math.asin(min(max(command, -reach), reach)) - car.heading) / HEADING_S
+    largest = LATERAL_MPS2 / max(speed, 1.0)
+    turn = min(max(turn, -largest), largest)
+    slip = math.asin(min(max(car.LENGTH / 2 / speed * turn, -1.0), 1.0))
+    steering = math.atan(2 * math.tan(slip))
+    return min(max(steering, -WHEEL_RAD), WHEEL_RAD)
+
+
+class LaneKeeping:
+    """Where in its lane a driver wants to be: its wander, and the lane change under way."""
+
+    def __init__(self, wander: Any, change_s: float) -> None:
+        self._wander, self._change_s = wander, change_s
+        self._from_m, self._since_s = 0.0, math.inf
+
+    def begin_change(self, from_m: float) -> None:
+        """A change begins at that place of the new lane (m, right of its centre)."""
+        self._from_m, self._since_s = from_m, 0.0
+
+    def step(self, dt: float, speed_mps: float) -> None:
+        """Time passes."""
+        self._since_s += dt
+        self._wander.step(dt, speed_mps)
+
+    def place(self) -> tuple[float, float]:
+        """Wished place (m right of the centre) and its rate (m/s); a change follows a half cosine."""
+        place, rate = self._wander.value, self._wander.rate
+        if self._since_s < self._change_s:
+            phase = math.pi * self._since_s / self._change_s
+            place += self._from_m * (1 + math.cos(phase)) / 2
+            rate -= self._from_m * math.pi / self._change_s * math.sin(phase) / 2
+        return place, rate
