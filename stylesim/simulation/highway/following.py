@@ -1,4 +1,4 @@
-"""How hard a driver brakes for whom it follows: the IDM, with a cool head for small gaps at which nothing is at stake."""
+"""How hard a driver brakes for whom it follows: the IDM, with a cool head where a gap is small but nothing at stake."""
 
 from __future__ import annotations
 

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
-from highway_env.road.lane import AbstractLane
+from highway_env.road.lane import AbstractLane, CircularLane, SineLane
 from highway_env.road.road import RoadNetwork
 
 JOINT_M = 0.5  # chosen: lanes whose ends are nearer than this are one path
@@ -19,6 +20,15 @@ def joins(lane: AbstractLane, following: AbstractLane) -> bool:
     return bool(np.linalg.norm(lane.position(lane.length, 0.0) - following.position(0.0, 0.0)) < JOINT_M)
 
 
+def bend_radius_m(lane: AbstractLane) -> float:
+    """Smallest radius of the lane's centre line, m: of a circle its own, of a sine 1 / (A w^2); straight: infinite."""
+    if isinstance(lane, CircularLane):
+        return float(lane.radius)
+    if isinstance(lane, SineLane):
+        return 1.0 / max(abs(lane.amplitude) * lane.pulsation**2, 1e-9)
+    return math.inf
+
+
 class LaneGraph:
     """Successors and predecessors of every lane, by geometry, worked out once."""
 
@@ -26,6 +36,7 @@ class LaneGraph:
         lanes = network.lanes_dict()
         self.length_m = {index: float(lane.length) for index, lane in lanes.items()}
         self.beside = {index[:2]: len(network.graph[index[0]][index[1]]) for index in lanes}
+        self.winds = any(bend_radius_m(lane) < math.inf for lane in lanes.values())
         self.after: dict[LaneIndex, tuple[LaneIndex, ...]] = {
             index: tuple(other for other in lanes if other[0] == index[1] and joins(lane, lanes[other]))
             for index, lane in lanes.items()

@@ -25,7 +25,7 @@ Needs = Mapping[LaneIndex, tuple[int, float]]
 
 
 def lane_needs(graph: LaneGraph, edges: Sequence[tuple[str, str]]) -> Needs:
-    """For each lane of a route's roads: (changes still needed, right positive; m after its end where that must be done).
+    """For each lane of a route's roads: (changes still needed, right positive; m after its end to do them in).
 
     Worked out from the last road to the first: a lane that goes on needs what its successor needs; one that does not
     needs a change to the nearest lane that does, before its own end.
@@ -118,12 +118,10 @@ def _accepts(car: Any, index: LaneIndex, *, must: bool, hurry: float) -> bool:
     road, style = car.road, car.style
     front, front_gap = road.ahead(car, index)
     rear, rear_gap = road.behind(car, index)
-    least = style.min_gap_m / 2 + ACCEPTED_SHARE * style.gap_acceptance_s * (1.0 - 0.5 * hurry) * (
-        rear.speed if rear is not None else 0.0
-    )
-    if (rear is not None and rear_gap < least) or (
-        front is not None and front_gap < style.min_gap_m / 2 + 0.5 * ACCEPTED_SHARE * style.gap_acceptance_s * car.speed
-    ):
+    lag_s = ACCEPTED_SHARE * style.gap_acceptance_s
+    if rear is not None and rear_gap < style.min_gap_m / 2 + lag_s * (1.0 - 0.5 * hurry) * rear.speed:
+        return False
+    if front is not None and front_gap < style.min_gap_m / 2 + lag_s * 0.5 * car.speed:
         return False
     hardest = -MOBIL_SAFE_MPS2 * NEUTRAL_GAP_S / max(style.gap_acceptance_s, 1.0) * (1.0 + MUST_HARDER * hurry)
     rear_after = car.judged(rear, car, rear_gap) if rear is not None else 0.0
@@ -132,29 +130,21 @@ def _accepts(car: Any, index: LaneIndex, *, must: bool, hurry: float) -> bool:
         return False
     if must:
         return True
-    old_front, old_front_gap = road.ahead(car, car.lane_index)
-    gain = own_after - car.judged(car, old_front, old_front_gap)
+    before = road.ahead(car, car.lane_index)
+    gain = own_after - car.judged(car, *before)
     if style.politeness > 0:
-        gain += style.politeness * _others_gain(car, front, front_gap, rear, rear_gap, rear_after, old_front, old_front_gap)
+        gain += style.politeness * _others_gain(car, (front, front_gap), (rear, rear_gap), rear_after, before)
     return bool(gain >= MOBIL_GAIN_MPS2 / max(style.lane_change_eagerness, 1e-3))
 
 
 def _others_gain(
-    car: Any,
-    front: Any,
-    front_gap: float,
-    rear: Any,
-    rear_gap: float,
-    rear_after: float,
-    old_front: Any,
-    old_front_gap: float,
+    car: Any, front: tuple[Any, float], rear: tuple[Any, float], rear_after: float, before: tuple[Any, float]
 ) -> float:
-    """What the followers on both lanes gain together, m/s2."""
+    """What the followers on both lanes gain together, m/s2; `before` is who is in front now. Gaps are in m."""
     gain = 0.0
-    if rear is not None:
-        gain += rear_after - car.judged(rear, front, rear_gap + front_gap + car.LENGTH)
-    old_rear, old_rear_gap = car.road.behind(car, car.lane_index)
-    if old_rear is not None:
-        joined = old_rear_gap + old_front_gap + car.LENGTH
-        gain += car.judged(old_rear, old_front, joined) - car.judged(old_rear, car, old_rear_gap)
+    if rear[0] is not None:
+        gain += rear_after - car.judged(rear[0], front[0], rear[1] + front[1] + car.LENGTH)
+    behind, gap = car.road.behind(car, car.lane_index)
+    if behind is not None:
+        gain += car.judged(behind, before[0], gap + before[1] + car.LENGTH) - car.judged(behind, car, gap)
     return gain

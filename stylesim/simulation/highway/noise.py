@@ -62,6 +62,7 @@ class Wander:
         self._target_m = self._sd_m * self._deviate()
         self.value = self._room_m * math.tanh(self._target_m / self._room_m)
         self.rate = 0.0
+        self.pull = 0.0
 
     def _deviate(self) -> float:
         if not self._deviates:
@@ -69,11 +70,12 @@ class Wander:
         return self._deviates.pop()
 
     def step(self, dt: float, speed_mps: float) -> None:
-        """`value` and its `rate` (m/s) dt seconds later."""
+        """`value`, its `rate` (m/s) and the `pull` on that (m/s2) dt seconds later."""
         pace = dt * min(max(speed_mps, 0.0) / FULL_SPEED_MPS, 1.0)
         keep = math.exp(-pace / self._time_s)
         self._target_m = keep * self._target_m + self._sd_m * math.sqrt(1.0 - keep * keep) * self._deviate()
         goal = self._room_m * math.tanh(self._target_m / self._room_m)
         pull = FILTER_RAD_PER_S**2 * (goal - self.value) - 2.0 * FILTER_RAD_PER_S * self.rate
-        self.rate += pace * min(max(pull, -LARGEST_ACCELERATION_MPS2), LARGEST_ACCELERATION_MPS2)
+        self.pull = min(max(pull, -LARGEST_ACCELERATION_MPS2), LARGEST_ACCELERATION_MPS2)
+        self.rate += pace * self.pull
         self.value += pace * self.rate

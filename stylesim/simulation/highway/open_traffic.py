@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from stylesim.simulation.highway.lane_choice import must_change, lane_needs
+from stylesim.simulation.highway.lane_choice import lane_needs, must_change
 from stylesim.simulation.highway.road import StyledRoad
 from stylesim.simulation.highway.sites import Edge, Site, Trip
 from stylesim.simulation.highway.spec import HighwayOptions

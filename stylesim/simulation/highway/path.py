@@ -8,6 +8,8 @@ from typing import Any
 
 from highway_env.road.lane import AbstractLane, CircularLane
 
+from stylesim.simulation.highway.graph import bend_radius_m
+
 CLEAR_M = 1.3  # half a car's width and 0.3 m: what a path needs on either side of its centre
 LANES_AHEAD = 2  # through the junction and onto the exit
 ALIGNED_RAD = math.radians(60)  # who crosses is the regulation's business, who goes along is a leader
@@ -20,16 +22,15 @@ def lanes_ahead(vehicle: Any) -> Iterator[tuple[float, AbstractLane]]:
     """(distance of its start from the vehicle, lane) for the lanes that follow on its route, nearest first."""
     if not vehicle.route:
         return
-    index = vehicle.target_lane_index
-    lane = vehicle.road.network.get_lane(index)
-    start = lane.length - lane.local_coordinates(vehicle.position)[0]
-    legs = [leg for leg in vehicle.route if leg[:2] != index[:2]]
-    for leg in legs[:LANES_AHEAD]:
-        if leg[0] != index[1]:
+    road, index = vehicle.road, vehicle.target_lane_index
+    start = road.graph.length_m[index] - road.place(vehicle, index)[0]
+    for _ in range(LANES_AHEAD):
+        onward = road.graph.onward(index, vehicle.route)
+        if onward is None:
             return
-        index, lane = leg, vehicle.road.network.get_lane(leg)
-        yield start, lane
-        start += lane.length
+        index = onward
+        yield start, road.network.get_lane(index)
+        start += road.graph.length_m[index]
 
 
 def reaches_into(lane: AbstractLane, along_m: float, lateral_m: float, other: Any) -> bool:
@@ -52,14 +53,14 @@ def curve_speed_mps(vehicle: Any, comfort_mps2: float) -> float:
     v = sqrt(a r) in a curve of radius r; sqrt(v^2 + 2 a d) at distance d before it. The longitudinal comfort is
     taken for the lateral one too (a friction circle) [ours]. Infinite on straight roads.
     """
-    if not getattr(vehicle, "route", None):
+    if not getattr(vehicle, "route", None) or not vehicle.road.graph.winds:
         return math.inf
     here = vehicle.road.network.get_lane(vehicle.target_lane_index)
-    result = math.sqrt(comfort_mps2 * here.radius) if isinstance(here, CircularLane) else math.inf
+    result = math.sqrt(comfort_mps2 * bend_radius_m(here))
     for start, lane in lanes_ahead(vehicle):
-        if isinstance(lane, CircularLane):
-            curve = comfort_mps2 * lane.radius
-            result = min(result, math.sqrt(curve + 2 * comfort_mps2 * max(start, 0.0)))
+        radius = bend_radius_m(lane)
+        if radius < math.inf:
+            result = min(result, math.sqrt(comfort_mps2 * radius + 2 * comfort_mps2 * max(start, 0.0)))
     return result
 
 

@@ -30,7 +30,7 @@ class Projection:
         self.length_m = [float(lane.length) for lane in self.lane]
         self._lengths = np.array(self.length_m)[:, None]
         straight = [isinstance(lane, StraightLane) for lane in self.lane]  # sine lanes are straight with a bend on top
-        self._straight = np.flatnonzero(straight)
+        self._straight = [n for n, flag in enumerate(straight) if flag]
         self._bent = [n for n in self._straight if isinstance(self.lane[n], SineLane)]
         self._round = [n for n, lane in enumerate(self.lane) if isinstance(lane, CircularLane)]
         self._other = [n for n, lane in enumerate(self.lane) if not straight[n] and n not in self._round]
@@ -79,7 +79,7 @@ class Projection:
         return lane.direction * turned * lane.radius, aside, self._heading_of - heading
 
     def closest(self) -> list[int]:
-        """Number of the lane that is closest to each car by highway-env's distance with heading, the first of equals."""
+        """Number of the closest lane of each car by highway-env's distance with heading, the first of equals."""
         beyond = np.maximum(self._along - self._lengths, 0.0) + np.maximum(-self._along, 0.0)
         return (np.abs(self._aside) + beyond + np.abs(self._angle)).argmin(axis=0).tolist()
 

@@ -43,13 +43,14 @@ class Site:
 
 
 def lanes_beside(
-    network: RoadNetwork, edge: Edge, start_x: float, end_x: float, *, lanes: int, limit_mps: float, last: LineType = SOLID
+    network: RoadNetwork, edge: Edge, along_x_m: tuple[float, float], *, lanes: int, limit_mps: float
 ) -> None:
-    """Straight lanes side by side from y = 0 to the right."""
+    """Straight lanes side by side from y = 0 to the right, between two places along x."""
+    start, end = along_x_m
     for lane in range(lanes):
-        lines = (SOLID if lane == 0 else STRIPED, last if lane == lanes - 1 else NONE)
+        lines = (SOLID if lane == 0 else STRIPED, SOLID if lane == lanes - 1 else NONE)
         y = lane * LANE_M
-        network.add_lane(*edge, StraightLane([start_x, y], [end_x, y], line_types=lines, speed_limit=limit_mps))
+        network.add_lane(*edge, StraightLane([start, y], [end, y], line_types=lines, speed_limit=limit_mps))
 
 
 def _slip(start: tuple[float, float], end: tuple[float, float], limit_mps: float) -> AbstractLane:
@@ -73,9 +74,9 @@ def merge_site(drawn: Mapping[str, float]) -> Site:
     joint, end, out = 700.0, 700.0 + ACCELERATION_LANE_M, 2500.0
     y = lanes * LANE_M
     network = RoadNetwork()
-    lanes_beside(network, ("in", "joint"), 0.0, joint, lanes=lanes, limit_mps=limit)
-    lanes_beside(network, ("joint", "end"), joint, end, lanes=lanes + 1, limit_mps=limit)
-    lanes_beside(network, ("end", "out"), end, out, lanes=lanes, limit_mps=limit)
+    lanes_beside(network, ("in", "joint"), (0.0, joint), lanes=lanes, limit_mps=limit)
+    lanes_beside(network, ("joint", "end"), (joint, end), lanes=lanes + 1, limit_mps=limit)
+    lanes_beside(network, ("end", "out"), (end, out), lanes=lanes, limit_mps=limit)
     before = joint - SLIP_M
     ramp = StraightLane(
         [before - 280.0, y + ASIDE_M], [before, y + ASIDE_M], line_types=(SOLID, SOLID), speed_limit=RAMP_LIMIT_MPS
@@ -100,9 +101,9 @@ def exit_site(drawn: Mapping[str, float]) -> Site:
     begin, fork, out = 1500.0, 1500.0 + DECELERATION_LANE_M, 2500.0
     y = lanes * LANE_M
     network = RoadNetwork()
-    lanes_beside(network, ("in", "begin"), 0.0, begin, lanes=lanes, limit_mps=limit)
-    lanes_beside(network, ("begin", "fork"), begin, fork, lanes=lanes + 1, limit_mps=limit)
-    lanes_beside(network, ("fork", "out"), fork, out, lanes=lanes, limit_mps=limit)
+    lanes_beside(network, ("in", "begin"), (0.0, begin), lanes=lanes, limit_mps=limit)
+    lanes_beside(network, ("begin", "fork"), (begin, fork), lanes=lanes + 1, limit_mps=limit)
+    lanes_beside(network, ("fork", "out"), (fork, out), lanes=lanes, limit_mps=limit)
     beyond = fork + SLIP_M
     network.add_lane("fork", "slip", _slip((fork, y), (beyond, y + ASIDE_M), RAMP_LIMIT_MPS))
     ramp = StraightLane(
@@ -122,5 +123,3 @@ def exit_site(drawn: Mapping[str, float]) -> Site:
 
 
 SITES: dict[str, Callable[[Mapping[str, float]], Site]] = {"merge": merge_site, "exit": exit_site}
-
-

@@ -56,8 +56,9 @@ class LaneKeeping:
         self._wander.step(dt, speed_mps)
 
     def place(self) -> tuple[float, float]:
-        """Wished place (m right of the centre) and its rate (m/s); a change follows a half cosine."""
-        place, rate = self._wander.value, self._wander.rate
+        """Wished place (m right of the centre) and rate (m/s) once the wheel has turned; a change is a half cosine."""
+        place = self._wander.value + HEADING_S * self._wander.rate
+        rate = self._wander.rate + HEADING_S * self._wander.pull
         if self._since_s < self._change_s:
             phase = math.pi * self._since_s / self._change_s
             place += self._from_m * (1 + math.cos(phase)) / 2

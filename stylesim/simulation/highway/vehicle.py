@@ -33,6 +33,9 @@ class StyledVehicle(IDMVehicle):  # type: ignore[misc]
     """
 
     speed: float
+    crashed: bool
+    impact: Any
+    target_lane_index: tuple[str, str, int]
     action: dict[str, float]
     lane_from_road = True  # its closest lane is found by the road, for all cars at once
 
@@ -93,7 +96,7 @@ class StyledVehicle(IDMVehicle):  # type: ignore[misc]
         self.action = {"steering": self.steering_control(self.target_lane_index), "acceleration": acceleration}
 
     def judged(self, car: Any, leader: Any, gap_m: float) -> float:
-        """IDM acceleration of `car` behind `leader` as this driver would drive it, m/s2; others get its own patience."""
+        """IDM acceleration of `car` behind `leader` as this driver would drive it, with its own patience, m/s2."""
         style = cast(DriverStyle, self.style)
         bold, ease = style.max_acceleration_mps2, style.comfortable_deceleration_mps2
         speed = max(car.speed, 0.0)

@@ -148,7 +148,8 @@ def test_a_car_off_the_road_is_removed_and_said_to_be():
     ("change", "says"),
     [
         ({"options": {"layout": "highway", "vehicle": 3}}, "did you mean 'vehicles'"),
-        ({"options": {"layout": "roundabout"}}, "layout"),
+        ({"options": {"layout": "spaghetti"}}, "layout"),
+        ({"options": {"layout": "merge"}}, "unknown parameter 'density_per_km_lane'|'ramp_share' is missing"),
         ({"options": {"layout": "highway", "simulation_hz": 15}}, "simulation_hz"),
         ({"parameters": {}}, "'density_per_km_lane' is missing"),
         ({"backend": "sumo"}, "not 'highway'"),

@@ -10,12 +10,13 @@ from highway_env.road.lane import StraightLane
 
 from stylesim.population import Population
 from stylesim.scenario import load_scenario
+from stylesim.simulation.highway.junction import JUNCTION_NODES, Junction
 from stylesim.simulation.highway.lanes import road_of
-from stylesim.simulation.highway.path import curve_speed_mps, path_gap_m
+from stylesim.simulation.highway.path import curve_speed_mps
 from stylesim.simulation.highway.quick import QuickStraightLane
 from stylesim.simulation.highway.right_of_way import RightOfWay
 from stylesim.simulation.highway.spec import options_of
-from stylesim.simulation.highway.traffic import JUNCTION_NODES, Crew, Junction
+from stylesim.simulation.highway.traffic import Crew
 from stylesim.simulation.highway.vehicle import StyledVehicle
 from stylesim.style import CLASS_KNOB
 from stylesim.styles import style_table
@@ -70,10 +71,12 @@ def test_gaps_go_around_the_corner(junction):
     lane = junction.road.network.get_lane(("il3", "o3", 0))
     leader.position = lane.position(5.0, 0.0)
     leader.heading = lane.heading_at(5.0)
+    leader.target_lane_index = ("il3", "o3", 0)
     inner = next(leg for leg in follower.route if leg[0] == "ir0")
     arc = junction.road.network.get_lane(inner).length
-    assert path_gap_m(follower, leader) == pytest.approx(5.0 + arc + 5.0, abs=0.01)
-    assert junction.road.neighbour_vehicles(follower)[0] is leader
+    found, gap = junction.road.ahead(follower, follower.lane_index)
+    assert found is leader is junction.road.neighbour_vehicles(follower)[0]
+    assert gap == pytest.approx(5.0 + arc + 5.0 - leader.LENGTH, abs=0.01)
 
 
 def test_curves_are_taken_at_a_speed_that_their_radius_allows(junction):
