@@ -17,8 +17,9 @@ from stylesim.population import Population
 from stylesim.randomness import stream
 from stylesim.scenario import Scenario
 from stylesim.simulation.highway.lanes import road_of
+from stylesim.simulation.highway.layouts import traffic_of
 from stylesim.simulation.highway.spec import options_of
-from stylesim.simulation.highway.traffic import Crew, Traffic, traffic_of
+from stylesim.simulation.highway.traffic import Crew, Traffic
 from stylesim.simulation.highway.vehicle import StyledVehicle
 from stylesim.style import STYLE_CLASSES
 

@@ -10,13 +10,14 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import Any
 
+from stylesim.simulation.highway.following import LEAST_GAP_M
 from stylesim.simulation.highway.graph import LaneGraph, LaneIndex
 
 MOBIL_GAIN_MPS2 = 0.2  # highway-env's threshold, an average driver's
 MOBIL_SAFE_MPS2 = 2.0  # highway-env's imposed braking, an average driver's
 NEUTRAL_GAP_S = 4.5  # gap acceptance of the neutral driver in agents/styles.yaml
 EVERY_S = 1.0  # highway-env's: lane changes are thought of once a second
-LEAST_MPS = 1.0  # highway-env's: who is slower does not change lanes
+LEAST_MPS = 1.0  # highway-env's: who is slower does not change lanes, unless it must
 ACCEPTED_SHARE = 0.2  # chosen: accepted lag is 0.9 s for the neutral gap of 4.5 s; observed median 0.8-1.5 s
 EARLIEST_M, LATEST_M = 1000.0, 300.0  # exits are announced 1000 m ahead; chosen: the boldest act in the last 300 m
 MUST_HARDER = 1.0  # chosen: at the end of its lane a driver imposes twice the braking that it imposes by choice
@@ -59,8 +60,9 @@ def must_change(car: Any) -> tuple[int, float]:
     changes, beyond = car.needs[car.target_lane_index]
     if not changes:
         return 0, 0.0
-    lane = car.road.network.get_lane(car.target_lane_index)
-    return changes, beyond + lane.length - car.road.place(car, car.target_lane_index)[0]
+    return changes, beyond + car.road.graph.length_m[car.target_lane_index] - car.road.place(
+        car, car.target_lane_index
+    )[0]
 
 
 def choose_lane(car: Any) -> None:
@@ -73,9 +75,9 @@ def choose_lane(car: Any) -> None:
     if car.timer < EVERY_S:
         return
     car.timer = 0.0
-    if car.speed < LEAST_MPS:
-        return
     changes, left_m = must_change(car)
+    if car.speed < LEAST_MPS and not changes:
+        return
     look_m = LATEST_M + (EARLIEST_M - LATEST_M) * car.style.politeness
     urgent = changes != 0 and left_m < look_m * abs(changes)
     for index in road.network.side_lanes(car.lane_index):
@@ -98,7 +100,7 @@ def _away_from_route(car: Any, index: LaneIndex) -> bool:
         return False
     changes, beyond = car.needs.get(index, (0, 0.0))
     here = car.needs.get(car.lane_index, (0, 0.0))[0]
-    left_m = beyond + car.road.network.get_lane(index).length - car.road.place(car, index)[0]
+    left_m = beyond + car.road.graph.length_m[index] - car.road.place(car, index)[0]
     return abs(changes) > abs(here) and left_m < EARLIEST_M
 
 
@@ -124,17 +126,25 @@ def _accepts(car: Any, index: LaneIndex, *, must: bool, hurry: float) -> bool:
     if front is not None and front_gap < style.min_gap_m / 2 + lag_s * 0.5 * car.speed:
         return False
     hardest = -MOBIL_SAFE_MPS2 * NEUTRAL_GAP_S / max(style.gap_acceptance_s, 1.0) * (1.0 + MUST_HARDER * hurry)
+    if must:  # what it takes not to touch, rather than what is comfortable
+        return min(_needed(rear, car, rear_gap), _needed(car, front, front_gap)) >= hardest
     rear_after = car.judged(rear, car, rear_gap) if rear is not None else 0.0
     own_after = car.judged(car, front, front_gap)
     if rear_after < hardest or own_after < hardest:
         return False
-    if must:
-        return True
     before = road.ahead(car, car.lane_index)
     gain = own_after - car.judged(car, *before)
     if style.politeness > 0:
         gain += style.politeness * _others_gain(car, (front, front_gap), (rear, rear_gap), rear_after, before)
     return bool(gain >= MOBIL_GAIN_MPS2 / max(style.lane_change_eagerness, 1e-3))
+
+
+def _needed(car: Any, leader: Any, gap_m: float) -> float:
+    """Acceleration that just brings a car to its leader's speed within the gap, m/s2; 0 or less."""
+    if car is None or leader is None:
+        return 0.0
+    closing = max(car.speed - leader.speed, 0.0)
+    return float(-(closing**2) / (2.0 * max(gap_m, LEAST_GAP_M)))
 
 
 def _others_gain(

@@ -15,7 +15,7 @@ from highway_env.road.road import RoadNetwork
 from jaxtyping import Float
 
 from stylesim.road import Lane, Road
-from stylesim.simulation.highway.graph import joins
+from stylesim.simulation.highway.graph import LaneGraph
 
 STRAIGHT_M = 20.0  # spacing of centre line points: straights
 CURVED_M = 1.0  # and everything else; the error on a curve of radius 9 m is then 1.4 cm
@@ -41,7 +41,7 @@ def road_of(network: RoadNetwork, *, junction_nodes: str = "") -> Road:
 
     Lanes that lead into the junction get a stop line at their end.
     """
-    lanes = []
+    lanes, graph = [], LaneGraph(network)
     for index, lane in network.lanes_dict().items():
         start, end, number = index
         spacing = STRAIGHT_M if isinstance(lane, StraightLane) and not isinstance(lane, SineLane) else CURVED_M
@@ -58,11 +58,7 @@ def road_of(network: RoadNetwork, *, junction_nodes: str = "") -> Road:
                 speed_limit_mps=float(lane.speed_limit),
                 left_boundary_m=left,
                 right_boundary_m=right,
-                successors=tuple(
-                    lane_id((end, onward, min(number, len(following) - 1)))
-                    for onward, following in network.graph.get(end, {}).items()
-                    if joins(lane, following[min(number, len(following) - 1)])
-                ),
+                successors=tuple(lane_id(other) for other in graph.after[index]),
                 left_neighbour=lane_id((start, end, number - 1)) if number > 0 else "",
                 right_neighbour=lane_id((start, end, number + 1)) if number + 1 < beside else "",
                 in_junction=inside,

@@ -133,9 +133,9 @@ class OpenTraffic(Traffic):
         for vehicle in self.road.vehicles:
             index = vehicle.target_lane_index
             edge = index[:2]
-            if vehicle.needs is not None and not vehicle.crashed:
+            if not vehicle.crashed:
                 left = self.road.graph.length_m[index] - self.road.place(vehicle, index)[0]
-                if edge == self._last_edge(vehicle) and left < LEAVES_M:
+                if left < LEAVES_M and not (vehicle.route and edge != self._last_edge(vehicle)):
                     continue
                 self._miss(vehicle)
             staying.append(vehicle)

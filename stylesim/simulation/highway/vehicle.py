@@ -21,7 +21,7 @@ from stylesim.style import DriverStyle
 TOP_SPEED_MPS = 60.0  # chosen, because highway-env's 40 m/s would cut off the wish of bold drivers
 LANE_WIDTH_M = 4.0  # highway-env's; what wander may use of it depends on the car's width
 KERB_M = 0.2  # what wander leaves between the car's side and the lane's edge
-LANE_END_M = 1.0  # chosen: who must stop at the end of its lane leaves that much
+LANE_END_M = 15.0  # chosen: who must stop at the end of its lane leaves that much to pull away
 
 
 class StyledVehicle(IDMVehicle):  # type: ignore[misc]
@@ -137,7 +137,7 @@ class StyledVehicle(IDMVehicle):  # type: ignore[misc]
     def _lane_end_m(self) -> float:
         """To the end of a lane that does not go on, from the front bumper; infinite where it does."""
         changes, left = must_change(self)
-        if not changes or (left > self.road.graph.length_m[self.target_lane_index]):
+        if not changes or self.road.graph.after[self.target_lane_index]:
             return math.inf
         return left - self.LENGTH / 2 - LANE_END_M
 
