@@ -59,7 +59,7 @@ def test_who_is_on_the_ramp_merges_before_its_lane_ends():
         crowd.advance()
         if step < 150:
             entering |= {car.driver_id: car for car in crowd.road.vehicles if car.lane_index[0] == "ramp"}
-    assert len(entering) >= 4
+    assert len(entering) >= 3
     assert not crowd.road.collided_pairs
     assert all(car.target_lane_index[:2] == ("end", "out") for car in entering.values())
 
