@@ -90,7 +90,7 @@ def test_everybody_is_seen_for_twenty_seconds_and_newcomers_settle_first():
     seconds = scene.tracks.valid.sum(axis=1) * scene.tracks.dt_s
     assert (seconds >= 20.0).mean() > 0.95
     late = np.flatnonzero(~scene.tracks.valid[:, 0])
-    assert len(late) > 10
+    assert len(late) > 5
     first = scene.tracks.valid[late].argmax(axis=1)
     entered = scene.tracks.position_m[late, first, 0]
     assert entered.min() > 40.0, "after 3 s nobody is at the entry any more"
