@@ -11,7 +11,7 @@ import typer
 from typer.core import TyperGroup
 
 from stylesim import __version__
-from stylesim.cli import corpora, describing, forecasting, generating, labelling, measuring, safety
+from stylesim.cli import corpora, describing, forecasting, generating, labelling, measuring, replaying, safety
 from stylesim.cli.console import err
 from stylesim.errors import StylesimError
 
@@ -46,7 +46,7 @@ app = typer.Typer(
     pretty_exceptions_enable=False,
     rich_markup_mode="rich",
 )
-for module in (generating, corpora, labelling, measuring, safety, forecasting, describing):
+for module in (generating, corpora, labelling, measuring, safety, forecasting, describing, replaying):
     module.add_to(app)
 
 

@@ -60,7 +60,8 @@ def _ribbon(lane: Lane) -> Float64[np.ndarray, "corner 2"] | None:
     return np.concatenate([line + normal, (line - normal)[::-1]])
 
 
-def _draw_road(axes: Axes, road: Road) -> None:
+def draw_road(axes: Axes, road: Road) -> None:
+    """Surface, centre lines, crosswalks and stop lines."""
     ribbons = [ribbon for lane in road.lanes if (ribbon := _ribbon(lane)) is not None]
     axes.add_collection(PolyCollection(ribbons, facecolors=SURFACE, edgecolors=FAINT, linewidths=0.5, zorder=1))
     centres = [lane.centre_line_m for lane in road.lanes]
@@ -130,7 +131,7 @@ def scene_figure(
         figure = Figure(figsize=(WIDTH, height), layout="constrained")
         axes = figure.subplots()
         if scene.road is not None:
-            _draw_road(axes, scene.road)
+            draw_road(axes, scene.road)
         _draw_tracks(axes, scene, styles, shown)
         for name in sorted(seen, key=value_order):
             axes.scatter([], [], s=24, color=style_colour(name), linewidths=0, label=f"{name}, n = {seen[name]}")

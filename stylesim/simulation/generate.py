@@ -56,7 +56,7 @@ def generate(
     job = _checked(scenarios, population, episodes=episodes, seed=seed, out=Path(out), workers=workers)
     job = replace(job, plan=plan, twins=twins)
     _check_twins(job)
-    request: dict[str, Any] = {"source": SOURCE, "seed": seed, "configuration": _configuration(job, episodes)}
+    request: dict[str, Any] = {"source": SOURCE, "seed": seed, "configuration": configuration(job, episodes)}
     if Path(out).exists():
         return _finished(Path(out), request, resume=resume)
     started = time.monotonic()
@@ -157,7 +157,7 @@ def _check_twins(job: Job) -> None:
             )
 
 
-def _configuration(job: Job, episodes: int) -> dict[str, Any]:
+def configuration(job: Job, episodes: int) -> dict[str, Any]:
     """Everything that the bytes depend on, without any path."""
     installed = {}
     for backend in sorted({scenario.backend for scenario in job.scenarios}):
