@@ -10,13 +10,15 @@ from typing import Any
 import numpy as np
 from jaxtyping import Float32, Float64
 
-from stylesim.errors import InputError
+from stylesim.datasets.guarding import bounded, reading
+from stylesim.datasets.polylines import map_line
 from stylesim.geometry import arc_length, resampled
 from stylesim.road import Lane, Road
 
 # Lanes for motor traffic [read: the lane types of the format are VEHICLE, BUS, BIKE]. A bicycle lane would be
 # the nearest "lane" of many a car beside it.
 DRIVABLE = ("VEHICLE", "BUS")
+MAX_FILE_BYTES = 1 << 28  # chosen: maps have 0.1 to 10 MB
 BOUNDARY_POINTS = 20  # chosen: lane segments are 10 to 60 m long, so the centre has a point every 0.5 to 3 m
 
 
@@ -26,17 +28,14 @@ def read_map(path: Path, origin_m: Float64[np.ndarray, " 2"]) -> Road:
     Centre lines are the file's own where it gives them, else the middle of the boundaries. Ids of successors and
     neighbours outside the map are left out. InputError where the file is damaged or no such map.
     """
-    try:
+    bounded(path, MAX_FILE_BYTES)
+    with reading(path, "Argoverse 2 map"):
         document = json.loads(path.read_bytes())
         segments = [s for s in document["lane_segments"].values() if s["lane_type"] in DRIVABLE]
         known = {str(s["id"]) for s in segments}
         lanes = tuple(_lane(segment, known, origin_m) for segment in segments)
         walks = tuple(_crosswalk(c, origin_m) for c in document.get("pedestrian_crossings", {}).values())
         return Road(lanes=lanes, source="map", crosswalks_m=walks)
-    except OSError as error:
-        raise InputError(f"cannot read the map {path}: {error.strerror or error}") from error
-    except (ValueError, KeyError, TypeError, AttributeError) as error:
-        raise InputError(f"{path} is damaged or no Argoverse 2 map ({type(error).__name__}: {error})") from error
 
 
 def _lane(segment: Mapping[str, Any], known: set[str], origin_m: Float64[np.ndarray, " 2"]) -> Lane:
@@ -63,11 +62,7 @@ def _neighbour(lane_id: Any, known: set[str]) -> str:
 def _points(
     points: Sequence[Mapping[str, float]], origin_m: Float64[np.ndarray, " 2"]
 ) -> Float32[np.ndarray, "point 2"]:
-    array = np.array([[p["x"], p["y"]] for p in points], np.float64).reshape(-1, 2) - origin_m
-    if not np.isfinite(array).all():
-        raise ValueError("a point is not finite")
-    apart = np.concatenate([[True], np.hypot(*np.diff(array, axis=0).T) > 1e-6])
-    return array[apart].astype(np.float32)
+    return map_line([[p["x"], p["y"]] for p in points], origin_m)
 
 
 def _even(line_m: Float32[np.ndarray, "point 2"]) -> Float64[np.ndarray, "sample 2"]:

@@ -9,12 +9,19 @@ import numpy as np
 from jaxtyping import Bool, Float, Int
 
 from stylesim.datasets.flagging import flagged_implausible
-from stylesim.datasets.plausible import MAX_LENGTH_M, MAX_SPEED_MPS, MAX_WIDTH_M, MIN_ROWS, MOVING_MPS, SPEED_RATIO
+from stylesim.datasets.plausible import (
+    MAX_DISTANCE_M,
+    MAX_LENGTH_M,
+    MAX_SPEED_MPS,
+    MAX_WIDTH_M,
+    MIN_ROWS,
+    MOVING_MPS,
+    SPEED_RATIO,
+)
 from stylesim.errors import InputError
 from stylesim.geometry import wrap_angle
 from stylesim.tracks import AgentKind, Tracks
 
-MAX_DISTANCE_M = 20_000.0  # chosen: farther from the scene's origin nothing is in view of one vehicle or drone
 MAX_COORDINATE_M = 1e8  # chosen: more than once round the earth is no coordinate in metres
 MAX_LOST_SHARE = 0.5  # chosen: a file that loses more of its rows than this is of other units, or damaged as a whole
 CAR_LENGTH_M = (2.5, 8.0)  # the median of a site's cars is 4 to 5 m; feet would give 15, decimetres 45, metres/feet 1.4

@@ -66,7 +66,9 @@ def recording_from(tracks: Path, lights: Path | None, stamp: Stamp | None) -> tu
         raise InputError(f"{tracks} has no usable row" + (f": {lost}" if lost else ""))
     table, begin = _on_clock(table, tracks, dropped)
     plausible.whole_file(table, tracks)
-    table = _kept(table, plausible.row(), "implausible", dropped)
+    table = _kept(table, plausible.row() & plausible.nearby(table), "implausible", dropped)
+    if table.is_empty():
+        raise InputError(f"{tracks}: none of its {dropped['implausible']} rows can be a road user in metres")
     rows = table.height
     table = table.unique(["id", "frame"], keep="first", maintain_order=True).sort("id", "frame")
     dropped["duplicate"] = rows - table.height

@@ -36,4 +36,17 @@ FORMATS = (
         licence="Waymo Dataset License (non-commercial)",
         where="https://huggingface.co/datasets/EMERGE-lab/GPUDrive",
     ),
+    DatasetFormat(
+        name="nuplan",
+        module="stylesim.datasets.nuplan",
+        description="nuPlan: logs of automated driving in four cities, with lights (SQLite)",
+        supports="<log>.db of versions 1.0 and 1.1, cut into scenes; the separate map (GeoPackage) is not read",
+        rate_hz=20.0,
+        has_map=False,
+        has_signals=True,
+        licence="CC BY-NC-SA 4.0",
+        where="https://www.nuscenes.org/nuplan",
+        options=("scene_s",),
+        numbers=("scene_s",),
+    ),
 )

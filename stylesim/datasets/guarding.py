@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import binascii
+import pickle
 import sqlite3
 import struct
 import zlib
@@ -42,6 +43,7 @@ def reading(file: Path, what: str) -> Iterator[None]:
         zlib.error,
         binascii.Error,
         sqlite3.Error,
+        pickle.UnpicklingError,
         pl.exceptions.PolarsError,
         pl.exceptions.PanicException,
     ) as error:

@@ -13,6 +13,7 @@ from stylesim.errors import InputError
 _EASTING_M, _NORTHING_M = (100_000.0, 900_000.0), (0.0, 10_000_000.0)
 MAX_SPEED_MPS = 70.0  # chosen, because nothing on a road is faster than 252 km/h
 MAX_LENGTH_M, MAX_WIDTH_M = 30.0, 5.0  # chosen: the longest road train of the EU is 25.25 m long and 2.6 m wide
+MAX_DISTANCE_M = 20_000.0  # chosen: farther from the middle nothing is in view of one vehicle, drone or mast
 MOVING_MPS = 3.0  # chosen: above it direction and speed are sure (yaw within 1.1 degrees of the velocity)
 MIN_ROWS = 50  # chosen: fewer moving rows do not prove that a unit is wrong
 SPEED_RATIO = (0.7, 1.4)  # chosen: km/h would give 0.28, feet 0.30
@@ -28,6 +29,12 @@ def row() -> pl.Expr:
         & pl.col("dimension_length").is_between(0.0, MAX_LENGTH_M, closed="right")
         & pl.col("dimension_width").is_between(0.0, MAX_WIDTH_M, closed="right")
     )
+
+
+def nearby(table: pl.DataFrame) -> pl.Expr:
+    """True for a row that is no farther than MAX_DISTANCE_M from the middle of all rows."""
+    names = ("center_easting", "center_northing")
+    return pl.all_horizontal(*((pl.col(n) - table[n].median()).abs() <= MAX_DISTANCE_M for n in names))
 
 
 def whole_file(table: pl.DataFrame, path: Path) -> None:

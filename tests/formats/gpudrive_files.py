@@ -60,7 +60,7 @@ def write(folder: Path, content: dict[str, Any], name: str = "tfrecord-00000-of-
     """The document as a file."""
     folder.mkdir(parents=True, exist_ok=True)
     file = folder / name
-    file.write_text(json.dumps(content))
+    file.write_text(json.dumps(content, default=str))
     return file
 
 

@@ -146,7 +146,7 @@ def mutated_frame(frame: pl.DataFrame, rng: np.random.Generator) -> pl.DataFrame
         return frame.sample(fraction=1.0, shuffle=True, seed=int(rng.integers(1 << 30)))
     if what == 3:
         other = frame.columns[int(rng.integers(frame.width))]
-        return frame.with_columns(pl.col(other).alias(name), pl.col(name).alias(other))
+        return frame.rename({name: other, other: name}) if name != other else frame.drop(name)
     if not column.dtype.is_numeric():
         kinds: tuple[Any, ...] = (None, "", "x" * 1000, 7)
         return frame.with_columns(pl.lit(kinds[rng.integers(4)]).alias(name))

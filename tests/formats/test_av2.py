@@ -107,7 +107,7 @@ def test_a_damaged_map_is_named(tmp_path, content):
     folder = av2.write(tmp_path)
     file = next(folder.glob("*.json"))
     file.write_text(content)
-    with pytest.raises(InputError, match="no Argoverse 2 map") as error:
+    with pytest.raises(InputError, match="Argoverse 2 map") as error:
         list(scenes(tmp_path))
     assert str(file) in str(error.value)
 

@@ -93,7 +93,8 @@ def _feature(name: str, values: Any) -> bytes:
     if isinstance(values, bytes):
         value = message(1, message(1, values))
     elif np.asarray(values).dtype.kind == "f":
-        value = message(2, message(1, np.asarray(values, "<f4").tobytes()))
+        with np.errstate(over="ignore"):
+            value = message(2, message(1, np.asarray(values, "<f4").tobytes()))
     else:
         value = message(3, packed(1, np.asarray(values).reshape(-1).tolist()))
     return message(1, message(1, name.encode()) + message(2, value))
