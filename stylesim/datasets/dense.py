@@ -15,6 +15,7 @@ from stylesim.datasets.plausible import (
     MAX_SPEED_MPS,
     MAX_WIDTH_M,
     MIN_ROWS,
+    MIN_SIDE_M,
     MOVING_MPS,
     SPEED_RATIO,
 )
@@ -58,7 +59,7 @@ def checked_tracks(
         near = (np.abs(relative) <= MAX_DISTANCE_M).all(-1)
         speed = np.hypot(velocity_mps[..., 0].astype(np.float64), velocity_mps[..., 1].astype(np.float64))
         length, width = size_m[:, 0], size_m[:, 1]
-        sized = (length > 0.0) & (length <= MAX_LENGTH_M) & (width > 0.0) & (width <= MAX_WIDTH_M)
+        sized = (length >= MIN_SIDE_M) & (length <= MAX_LENGTH_M) & (width >= MIN_SIDE_M) & (width <= MAX_WIDTH_M)
     kept = readable & near & (speed <= MAX_SPEED_MPS) & sized[:, None]
     dropped = {"unreadable": int((valid & ~readable).sum()), "implausible": int((readable & ~kept).sum())}
     total = int(valid.sum())

@@ -49,4 +49,15 @@ FORMATS = (
         options=("scene_s",),
         numbers=("scene_s",),
     ),
+    DatasetFormat(
+        name="scenarionet",
+        module="stylesim.datasets.scenarionet",
+        description="ScenarioNet: scenarios of many data sets in MetaDrive's description (pickle)",
+        supports="sd_*.pkl of a database; light states as names or numbers; pickles are read without being run",
+        rate_hz=10.0,
+        has_map=True,
+        has_signals=True,
+        licence="that of the data set it was made from",
+        where="https://github.com/metadriverse/scenarionet",
+    ),
 )

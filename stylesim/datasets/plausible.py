@@ -12,6 +12,7 @@ from stylesim.errors import InputError
 # UTM by definition: eastings of one zone, northings of one hemisphere.
 _EASTING_M, _NORTHING_M = (100_000.0, 900_000.0), (0.0, 10_000_000.0)
 MAX_SPEED_MPS = 70.0  # chosen, because nothing on a road is faster than 252 km/h
+MIN_SIDE_M = 0.01  # chosen: nothing that is a road user is thinner
 MAX_LENGTH_M, MAX_WIDTH_M = 30.0, 5.0  # chosen: the longest road train of the EU is 25.25 m long and 2.6 m wide
 MAX_DISTANCE_M = 20_000.0  # chosen: farther from the middle nothing is in view of one vehicle, drone or mast
 MOVING_MPS = 3.0  # chosen: above it direction and speed are sure (yaw within 1.1 degrees of the velocity)
@@ -26,8 +27,8 @@ def row() -> pl.Expr:
         pl.col("center_easting").is_between(*_EASTING_M)
         & pl.col("center_northing").is_between(*_NORTHING_M)
         & (pl.col("velocity_easting").pow(2) + pl.col("velocity_northing").pow(2) <= MAX_SPEED_MPS**2)
-        & pl.col("dimension_length").is_between(0.0, MAX_LENGTH_M, closed="right")
-        & pl.col("dimension_width").is_between(0.0, MAX_WIDTH_M, closed="right")
+        & pl.col("dimension_length").is_between(MIN_SIDE_M, MAX_LENGTH_M)
+        & pl.col("dimension_width").is_between(MIN_SIDE_M, MAX_WIDTH_M)
     )
 
 

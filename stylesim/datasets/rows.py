@@ -8,7 +8,7 @@ import numpy as np
 from jaxtyping import Bool, Float64
 
 from stylesim.datasets.dense import MAX_COORDINATE_M, MAX_LOST_SHARE
-from stylesim.datasets.plausible import MAX_DISTANCE_M, MAX_LENGTH_M, MAX_SPEED_MPS, MAX_WIDTH_M
+from stylesim.datasets.plausible import MAX_DISTANCE_M, MAX_LENGTH_M, MAX_SPEED_MPS, MAX_WIDTH_M, MIN_SIDE_M
 from stylesim.errors import InputError
 
 
@@ -32,7 +32,7 @@ def usable(
         middle = np.median(position_m[sane], axis=0) if sane.any() else np.zeros(2)
         kept = sane & (np.abs(position_m - middle) <= MAX_DISTANCE_M).all(axis=1)
         kept &= np.hypot(velocity_mps[:, 0], velocity_mps[:, 1]) <= MAX_SPEED_MPS
-        kept &= (size_m > 0).all(axis=1) & (size_m[:, 0] <= MAX_LENGTH_M) & (size_m[:, 1] <= MAX_WIDTH_M)
+        kept &= (size_m >= MIN_SIDE_M).all(axis=1) & (size_m[:, 0] <= MAX_LENGTH_M) & (size_m[:, 1] <= MAX_WIDTH_M)
     dropped = {"unreadable": int((~readable).sum()), "implausible": int((readable & ~kept).sum())}
     if sum(dropped.values()) > MAX_LOST_SHARE * len(kept) or not kept.any():
         raise InputError(
