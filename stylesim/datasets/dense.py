@@ -9,8 +9,8 @@ import numpy as np
 from jaxtyping import Bool, Float, Int
 
 from stylesim.datasets.flagging import flagged_implausible
-from stylesim.datasets.plausible import MAX_DISTANCE_M as MAX_DISTANCE_M
 from stylesim.datasets.plausible import (
+    MAX_DISTANCE_M,
     MAX_LENGTH_M,
     MAX_SPEED_MPS,
     MAX_WIDTH_M,

@@ -14,9 +14,9 @@ import polars as pl
 from jaxtyping import Float64, Int64
 
 from stylesim.datasets.consistency import refuse_other_units
-from stylesim.datasets.dense import MAX_DISTANCE_M, MAX_LOST_SHARE
+from stylesim.datasets.dense import MAX_LOST_SHARE
 from stylesim.datasets.motion import backward_velocity, courses
-from stylesim.datasets.plausible import MAX_LENGTH_M, MAX_SPEED_MPS, MAX_WIDTH_M
+from stylesim.datasets.plausible import MAX_DISTANCE_M, MAX_LENGTH_M, MAX_SPEED_MPS, MAX_WIDTH_M
 from stylesim.datasets.recording import NEVER, Recording, SignalLog
 from stylesim.datasets.sizes import completed
 from stylesim.errors import InputError
