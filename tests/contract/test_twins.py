@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from functools import cache
 
 import numpy as np
 import pytest
@@ -18,7 +19,8 @@ from stylesim.simulation.twins import twins_of
 CROWD = Population.load("tdbm_spectrum")
 WARM_UP_S = {"sumo": 25.0, "highway": 1.0}  # SUMO's roads are empty at first
 AT_S = 3.0
-CASES = tuple(name for name in scenarios() if load_scenario(name).backend == "sumo")
+ALWAYS = ("highway", "hw_merge", "intersection", "ramp_merge", "yellow_light")  # one of each kind of traffic
+CASES = [name if name in ALWAYS else pytest.param(name, marks=pytest.mark.slow) for name in scenarios()]
 
 
 class Episodes:
@@ -34,6 +36,7 @@ class Episodes:
     def run(self, plan: EpisodePlan) -> Scene:
         return self.backend.run_episode(self.scenario, CROWD, seed=5, episode=1, plan=plan)
 
+    @cache  # noqa: B019 - lives as long as the module's tests
     def twins(self, at_s: float | None) -> tuple[tuple[Twin, Scene], ...]:
         planned = twins_of(self.base, TwinRequest(at_s=at_s), CROWD, backend=self.scenario.backend, seed=5, episode=1)
         assert [twin.name for twin in planned] == ["twin", "null"]

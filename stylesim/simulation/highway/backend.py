@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import numpy as np
 
-from stylesim.errors import InputError
 from stylesim.population import Population
 from stylesim.randomness import stream
 from stylesim.scenario import Scenario
@@ -33,11 +32,9 @@ class HighwayBackend:
         self, scenario: Scenario, population: Population, *, seed: int, episode: int, plan: EpisodePlan = PLAIN
     ) -> Scene:
         """One episode at 10 Hz; the same arguments give the same scene. InputError for options that do not fit."""
-        if plan.twin is not None:
-            raise InputError(f"scenario {scenario.name!r}: the backend 'highway' cannot make twins yet; SUMO can")
         options = options_of(scenario)
         drawn = scenario.draw(stream(seed, episode, "", "parameters"))
-        crew = Crew(population, seed=seed, episode=episode)
+        crew = Crew(population, seed=seed, episode=episode, twin=plan.twin)
         traffic = traffic_of(options, drawn, crew, time_s=scenario.warm_up_s + scenario.duration_s)
         n_frames = round(scenario.duration_s * LOG_HZ)
         log = TrackLog(n_frames, 1.0 / LOG_HZ)
@@ -46,8 +43,9 @@ class HighwayBackend:
         early = len(traffic.removed)
         for vehicle in traffic.road.vehicles:
             vehicle.emergency_braked = False  # what happens in the log counts
-        for _ in range(n_frames):
+        for frame in range(n_frames):
             log.add(traffic.logged())
+            crew.after_frame(frame / LOG_HZ, traffic.road.vehicles)
             for _ in range(options.simulation_hz // LOG_HZ):
                 traffic.advance()
         tracks = log.tracks(set(traffic.removed))

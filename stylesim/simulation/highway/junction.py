@@ -46,12 +46,15 @@ class Junction(IntersectionEnv):  # type: ignore[misc]
         super()._make_road()
         for lane in self.road.network.lanes_list():
             lane.speed_limit = self._limit_mps
-        self.road = StyledRegulatedRoad(network=self.road.network, np_random=self.np_random)
+        # a stream of its own: highway-env draws from it for every car that comes, and who comes depends on the traffic
+        self.road = StyledRegulatedRoad(network=self.road.network, np_random=self._crew.stream("road"))
 
     def _spawn_vehicle(self, *args: Any, **kwargs: Any) -> Any:
         vehicle = super()._spawn_vehicle(*args, **kwargs)
         if vehicle is not None:
             self._crew.hire(vehicle)
+        else:
+            self._crew.pass_over()
         return vehicle
 
     def _release_ego(self) -> None:

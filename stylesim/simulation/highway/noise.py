@@ -29,6 +29,13 @@ class OrnsteinUhlenbeck:
         self.value = self._raw * (time_s / (time_s + smoothing_s))  # the lag's mean, given the input
         self.rate = 0.0
 
+    def retune(self, sd: float, time_s: float, rng: np.random.Generator | None = None) -> None:
+        """Go on from where it is with another deviation and time, and with `rng` from other draws."""
+        self._sd = sd * math.sqrt((time_s + self._smoothing_s) / time_s)
+        self._time_s = time_s
+        if rng is not None:
+            self._rng, self._deviates = rng, []
+
     def _deviate(self) -> float:
         if not self._deviates:
             self._deviates = self._rng.standard_normal(_BLOCK).tolist()
@@ -63,6 +70,13 @@ class Wander:
         self.value = self._room_m * math.tanh(self._target_m / self._room_m)
         self.rate = 0.0
         self.pull = 0.0
+
+    def retune(self, style: DriverStyle, rng: np.random.Generator | None = None) -> None:
+        """Go on from where it is as another style, and with `rng` from other draws."""
+        self._sd_m = style.lane_wander_m / float(filter_gain(np.array([style.lane_wander_time_s]))[0])
+        self._time_s = style.lane_wander_time_s
+        if rng is not None:
+            self._rng, self._deviates = rng, []
 
     def _deviate(self) -> float:
         if not self._deviates:

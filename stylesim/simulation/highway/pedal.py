@@ -27,6 +27,11 @@ class Pedal:
         self._pressed_mps2 = 0.0
         self.emergency = False
 
+    def retune(self, style: DriverStyle, rng: np.random.Generator | None = None) -> None:
+        """The foot of another person from here on; with `rng` its restlessness goes on from other draws."""
+        self._noise.retune(style.pedal_noise_mps2, style.pedal_noise_time_s, rng)
+        self._lag_s = PEDAL_LAG * style.reaction_time_s
+
     def press(self, wish_mps2: float, speed_mps: float, dt: float) -> float:
         """The pressed acceleration dt seconds later, m/s2; sets `emergency` where the wish needs more than comfort.
 

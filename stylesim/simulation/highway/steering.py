@@ -5,6 +5,10 @@ from __future__ import annotations
 import math
 from typing import Any
 
+import numpy as np
+
+from stylesim.style import DriverStyle
+
 HEADING_S, LATERAL_S = 0.3, 1.0  # chosen: highway-env's 0.2 and 0.6 overshoot when the wheels take time to turn
 BEND_M = 0.5  # over which the curvature of the lane is taken
 LANE_ANGLE_RAD = 0.35  # chosen: largest angle to the lane; highway-env's 45 degrees spins slow cars
@@ -44,11 +48,18 @@ class LaneKeeping:
 
     def __init__(self, wander: Any, change_s: float) -> None:
         self._wander, self._change_s = wander, change_s
+        self._next_change_s = change_s
         self._from_m, self._since_s = 0.0, math.inf
 
     def begin_change(self, from_m: float) -> None:
         """A change begins at that place of the new lane (m, right of its centre)."""
         self._from_m, self._since_s = from_m, 0.0
+        self._change_s = self._next_change_s
+
+    def retune(self, style: DriverStyle, rng: np.random.Generator | None = None) -> None:
+        """Another person from here on; a lane change under way is finished as it was begun."""
+        self._wander.retune(style, rng)
+        self._next_change_s = style.lane_change_duration_s
 
     def step(self, dt: float, speed_mps: float) -> None:
         """Time passes."""

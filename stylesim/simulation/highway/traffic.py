@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 
 import numpy as np
 from highway_env.road.road import RoadNetwork
@@ -13,6 +13,7 @@ from stylesim.randomness import stream
 from stylesim.simulation.highway.road import StyledRoad
 from stylesim.simulation.highway.spec import HighwayOptions
 from stylesim.simulation.highway.vehicle import TOP_SPEED_MPS, StyledVehicle
+from stylesim.simulation.plan import Twin, salted
 
 RUN_UP_M = 100.0  # road behind the last car at the start
 
@@ -20,14 +21,22 @@ RUN_UP_M = 100.0  # road behind the last car at the start
 class Crew:
     """Gives every car a driver, drawn from the population by the car's number, and an id."""
 
-    def __init__(self, population: Population, *, seed: int, episode: int) -> None:
+    def __init__(self, population: Population, *, seed: int, episode: int, twin: Twin | None = None) -> None:
         self._population = population
         self._key = (seed, episode)
         self._hired = 0
+        self._twin = twin
+        self._differs = twin is not None and twin.at_s is None  # the twin's driver is another one by now
 
     def stream(self, purpose: str) -> np.random.Generator:
         """The episode's own random stream for that purpose."""
         return stream(*self._key, "", purpose)
+
+    def driver_stream(self, driver_id: str, purpose: str) -> np.random.Generator:
+        """The driver's random stream for that purpose, from now on (a null twin's is another one)."""
+        twin = self._twin
+        other = self._differs and twin is not None and twin.new_noise and twin.driver == driver_id
+        return stream(*self._key, driver_id, salted(purpose, new_noise=other))
 
     def hire(self, vehicle: StyledVehicle) -> None:
         """Give the car its driver, unless it has one."""
@@ -37,8 +46,25 @@ class Crew:
         self._hired += 1
         limit = vehicle.lane.speed_limit
         style = self._population.draw(stream(*self._key, driver_id, "style"), backend="highway", limit_mps=limit)
-        pedal, lane = stream(*self._key, driver_id, "pedal"), stream(*self._key, driver_id, "lane wander")
+        if self._twin is not None and self._differs and self._twin.driver == driver_id:
+            style = self._twin.style
+        pedal, lane = self.driver_stream(driver_id, "pedal"), self.driver_stream(driver_id, "lane wander")
         vehicle.adopt(style, driver_id=driver_id, pedal=pedal, lane=lane)
+
+    def pass_over(self) -> None:
+        """A car that did not come keeps its number, so that who comes later is who it would have been."""
+        self._hired += 1
+
+    def after_frame(self, time_s: float, vehicles: Iterable[StyledVehicle]) -> None:
+        """At the moment of the twin its driver becomes another one; `time_s` is that of the frame just logged."""
+        twin = self._twin
+        if twin is None or twin.at_s is None or self._differs or time_s < twin.at_s - 1e-9:
+            return
+        self._differs = True
+        for vehicle in vehicles:
+            if vehicle.driver_id == twin.driver:
+                purposes = ("pedal", "lane wander") if twin.new_noise else ()
+                vehicle.become(twin.style, *(self.driver_stream(twin.driver, purpose) for purpose in purposes))
 
 
 class Traffic:

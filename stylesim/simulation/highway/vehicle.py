@@ -66,6 +66,17 @@ class StyledVehicle(IDMVehicle):  # type: ignore[misc]
         room = (LANE_WIDTH_M - self.WIDTH) / 2 - KERB_M
         self._keeping = LaneKeeping(Wander(style, room_m=room, rng=lane), style.lane_change_duration_s)
 
+    def become(
+        self,
+        style: DriverStyle,
+        pedal: np.random.Generator | None = None,
+        lane: np.random.Generator | None = None,
+    ) -> None:
+        """Its driver becomes another one on the way; with `pedal` and `lane` its noise goes on from other draws."""
+        self.style = style
+        self._pedal.retune(style, pedal)
+        self._keeping.retune(style, lane)
+
     @property
     def wished_speed_mps(self) -> float:
         """What the driver would drive on a free road here; 0 while it yields or hesitates after yielding."""
