@@ -11,7 +11,17 @@ import typer
 from typer.core import TyperGroup
 
 from stylesim import __version__
-from stylesim.cli import corpora, describing, forecasting, generating, labelling, measuring, replaying, safety
+from stylesim.cli import (
+    corpora,
+    describing,
+    examining,
+    forecasting,
+    generating,
+    labelling,
+    measuring,
+    replaying,
+    safety,
+)
 from stylesim.cli.console import err
 from stylesim.errors import StylesimError
 
@@ -46,7 +56,7 @@ app = typer.Typer(
     pretty_exceptions_enable=False,
     rich_markup_mode="rich",
 )
-for module in (generating, corpora, labelling, measuring, safety, forecasting, describing, replaying):
+for module in (generating, corpora, labelling, measuring, safety, forecasting, examining, describing, replaying):
     module.add_to(app)
 
 

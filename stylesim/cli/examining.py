@@ -1,0 +1,95 @@
+"""`compare`, `conformal`: two examinations side by side, and how wide a forecast must be to hold the truth."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+
+import typer
+
+from stylesim.cli.console import progress_bar, say, show_table
+from stylesim.errors import InputError
+
+
+def compare(
+    ours: Path = typer.Argument(help="An evaluation's .json (in the folder that `evaluate` made)."),
+    theirs: Path = typer.Argument(help="Another one's, of the same corpus and windows."),
+    by: str | None = typer.Option(None, help="One stratum only; all that both have, without it."),
+    seed: int = typer.Option(0, min=0, help="Of the bootstrap."),
+) -> None:
+    """Paired differences of two forecasters on the same windows, with 95 % intervals; below 0 the first is better."""
+    from stylesim.evaluation.compare import differences
+    from stylesim.evaluation.results import HEADINGS, interval_text, load_evaluation
+    from stylesim.evaluation.slices import ALL
+
+    a, b = load_evaluation(ours), load_evaluation(theirs)
+    shared = [name for name in a.by if name in b.by]
+    if by is not None and by not in shared:
+        raise InputError(f"--by: {by!r} is not in both evaluations; they share {', '.join(shared) or 'none'}")
+    for stratum in (ALL, *(shared if by is None else [by])):
+        cells = differences(a, b, stratum, seed=seed)
+        rows = []
+        for value, metrics in cells.items():
+            size = next(iter(metrics.values()))
+            numbers = [interval_text(metrics[name]) for name in HEADINGS]
+            rows.append((value, f"{size.n_drivers} / {size.n_units}", *numbers))
+        heads = (stratum, "drivers / units", *HEADINGS.values())
+        show_table(f"{a.forecaster} minus {b.forecaster}, by {stratum}", heads, rows)
+
+
+def conformal(
+    forecaster: str = typer.Argument(help="A forecaster, as for `evaluate`."),
+    corpus: Path = typer.Argument(help="A corpus with splits."),
+    by: str = typer.Option("history:tdbm", help="Groups with a radius of their own: history:tdbm*scenario."),
+    alpha: float = typer.Option(0.1, help="1 - alpha is the promised coverage."),
+    calibrate_on: str = typer.Option("val", help="Split whose drivers give the radii."),
+    test_on: str = typer.Option("test", help="Split on which coverage is measured."),
+    history: float = typer.Option(5.0, min=0.1, help="Seconds of history that the forecaster sees."),
+    future: float = typer.Option(6.0, min=0.1, help="Seconds to forecast; cut to its horizon."),
+    stride: float = typer.Option(3.0, min=0.1, help="Seconds from one t0 of a scene to the next."),
+    seed: int = typer.Option(0, min=0, help="Of the drawn windows and the bootstrap."),
+    out: Path | None = typer.Option(None, help="JSON to write."),
+) -> None:
+    """Split-conformal radii about a forecaster's modes, per style, with the coverage measured on held-out drivers."""
+    from stylesim.corpus import Corpus
+    from stylesim.corpus.files import json_bytes, write_whole
+    from stylesim.evaluation.conformal import conformal as run
+    from stylesim.evaluation.results import interval_text
+    from stylesim.forecasting.opening import open_forecaster
+    from stylesim.windows import WindowSpec
+
+    opened, spec = Corpus(corpus), WindowSpec(history, future, stride)
+    has_train = any(info.split == "train" for info in opened.info)
+    model = open_forecaster(forecaster, train=(lambda: opened.split("train")) if has_train else None, spec=spec)
+    with progress_bar("forecasting", "scenes") as progress:
+        report = run(
+            model, opened, by=by, alpha=alpha, calibrate_on=calibrate_on, test_on=test_on, spec=spec, seed=seed,
+            progress=progress,
+        )  # fmt: skip
+    rows = []
+    for region in report.regions:
+        own = "too few" if math.isnan(region.radius_m) else f"{region.radius_m:.2f}"
+        covered = "–" if region.coverage is None else interval_text(region.coverage)
+        judged = f"{region.pooled_coverage.n_drivers} / {region.pooled_coverage.n_units}"
+        rows.append(
+            (region.group, str(region.calibration_drivers), own, judged, covered, interval_text(region.pooled_coverage))
+        )
+    pooled = report.about["pooled_radius_m"]
+    show_table(
+        f"{model.name}: discs that hold {1 - alpha:.0%} of the final positions; all together {pooled:.2f} m",
+        (by, "calibration drivers", "radius (m)", "test drivers / units", "coverage", "coverage, one radius for all"),
+        rows,
+    )
+    if out is not None:
+        write_whole(out, json_bytes(report.to_dict()))
+        say(f"{out}")
+
+
+def add_to(app: typer.Typer) -> None:
+    """Register the verbs."""
+    app.command(
+        "compare", epilog="Example: `stylesim compare runs/report/mine.json runs/report/constant_velocity.json`"
+    )(compare)
+    app.command("conformal", epilog="Example: `stylesim conformal runs/model runs/mixed --by history:tdbm*scenario`")(
+        conformal
+    )
