@@ -60,4 +60,15 @@ FORMATS = (
         licence="that of the data set it was made from",
         where="https://github.com/metadriverse/scenarionet",
     ),
+    DatasetFormat(
+        name="lyft",
+        module="stylesim.datasets.lyft",
+        description="Lyft Level 5 prediction: 25 s scenes of Palo Alto (zarr)",
+        supports="zarr version 2 folders with scenes, frames, agents (blosc); no semantic map, hence no light colours",
+        rate_hz=10.0,
+        has_map=False,
+        has_signals=False,
+        licence="CC BY-NC-SA 4.0 (Lyft, non-commercial)",
+        where="https://woven.toyota/en/prediction-dataset",
+    ),
 )

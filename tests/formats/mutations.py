@@ -129,7 +129,8 @@ def mutated_array(values: np.ndarray, rng: np.random.Generator) -> np.ndarray:
     flat[places] = rng.choice([np.nan, np.inf, -np.inf, 1e308, -1.0, 0.0, 1e7, 3e9])
     if what == 5:
         start = int(rng.integers(flat.size))
-        flat[start:] *= float(rng.choice(FACTORS))
+        with np.errstate(over="ignore", invalid="ignore"):
+            flat[start:] *= float(rng.choice(FACTORS))
     return array
 
 

@@ -1,0 +1,116 @@
+import json
+import sys
+
+import numpy as np
+import pytest
+
+from stylesim.datasets.lyft import scenes
+from stylesim.errors import InputError, MissingDependencyError
+from stylesim.tracks import AgentKind, TrackFlag
+from tests.formats import lyft_files as lyft
+from tests.formats.world import World
+
+
+@pytest.mark.parametrize("packed", [True, False])
+def test_values_are_read_exactly(tmp_path, packed):
+    (scene,) = scenes(lyft.write(tmp_path, lyft.records(), packed=packed))
+    tracks, world = scene.tracks, World(n_frames=60)
+    assert tracks.agent_id == ("ego", *(str(i) for i in world.id[1:]))
+    assert tracks.kind.tolist() == [AgentKind.CAR] * 5 + [AgentKind.BICYCLE, AgentKind.PEDESTRIAN]
+    there = world.valid
+    np.testing.assert_array_equal(tracks.valid, there)
+    np.testing.assert_allclose((tracks.position_m + tracks.origin_m)[there], world.position[there], atol=1e-4)
+    np.testing.assert_allclose(tracks.velocity_mps[there], world.velocity[there], atol=1e-3)
+    np.testing.assert_allclose(tracks.size_m[1:], world.size[1:], atol=1e-6)
+    assert tracks.flagged(TrackFlag.EGO).tolist() == [True] + [False] * 6
+    assert tracks.lookahead_steps[0].tolist() == [1] + [0] * 59  # the ego's first velocity needs a second pose
+    assert scene.counts["rows_in"] == scene.counts["rows_out"] == world.steps
+
+
+def test_scenes_that_follow_one_another_are_one_recording(tmp_path):
+    found = list(scenes(lyft.write(tmp_path, lyft.records(n_frames=20, starts_s=(0.0, 2.5, 300.0)))))
+    assert len({s.scene_id for s in found}) == 3
+    assert found[0].unit_id == found[1].unit_id != found[2].unit_id
+    assert [s.start_s for s in found] == pytest.approx([0.0, 2.5, 0.0])
+
+
+def test_bad_rows_are_counted(tmp_path):
+    arrays = lyft.records()
+    arrays["agents"]["centroid"][3] = np.nan
+    arrays["agents"]["velocity"][4] = 300.0
+    arrays["agents"]["track_id"][12] = arrays["agents"]["track_id"][11]
+    (scene,) = scenes(lyft.write(tmp_path, arrays))
+    steps = World(n_frames=60).steps
+    assert dict(scene.counts) == {
+        "rows_in": steps, "rows_out": steps - 3, "rows_dropped_unreadable": 1, "rows_dropped_implausible": 1,
+        "rows_dropped_duplicate": 1,
+    }  # fmt: skip
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        (lambda a: a["frames"]["timestamp"].__setitem__(5, lyft.BEGIN_NS), "no clock of 0.1 s"),
+        (lambda a: a["frames"]["agent_index_interval"].__setitem__((5, 1), 3), "not in one piece"),
+        (lambda a: a["frames"]["agent_index_interval"].__setitem__((-1, 1), 10**9), "rows; 0 to 1000000000"),
+        (lambda a: a["scenes"]["frame_index_interval"].__setitem__((0, 1), 0), "has the frames 0 to 0"),
+        (lambda a: a["agents"]["centroid"].__imul__(20.0), "other units|as fast as"),
+    ],
+)
+def test_what_cannot_be_is_refused(tmp_path, change, message):
+    arrays = lyft.records()
+    change(arrays)
+    store = lyft.write(tmp_path, arrays)
+    with pytest.raises(InputError, match=message) as error:
+        list(scenes(store))
+    assert str(store) in str(error.value)
+
+
+def test_damaged_chunks_are_named(tmp_path):
+    def broken(name, spoil):
+        store = lyft.write(tmp_path / name, lyft.records())
+        chunk = store / "agents" / "1"
+        spoil(store, chunk)
+        with pytest.raises(InputError, match="agents"):
+            list(scenes(store))
+
+    broken("a", lambda store, chunk: chunk.unlink())
+    broken("b", lambda store, chunk: chunk.write_bytes(chunk.read_bytes()[:-1]))
+    broken("c", lambda store, chunk: chunk.write_bytes(b""))
+    broken("bomb", lambda store, chunk: chunk.write_bytes(b"\x02\x01\x21\x08" + b"\xff" * 8 + b"\x10\x00\x00\x00"))
+
+    def other(key, value):
+        def spoil(store, chunk):
+            meta = store / "agents" / ".zarray"
+            meta.write_text(json.dumps(json.loads(meta.read_text()) | {key: value}))
+
+        return spoil
+
+    for i, (key, value) in enumerate(
+        [("chunks", [10**12]), ("shape", [-1]), ("shape", [10**15]), ("compressor", {"id": "zlib"}), ("zarr_format", 3),
+         ("dtype", "<f8"), ("dtype", [["centroid", "|O"]]), ("chunks", [])]
+    ):  # fmt: skip
+        store = lyft.write(tmp_path / f"m{i}", lyft.records())
+        other(key, value)(store, None)
+        with pytest.raises(InputError):
+            list(scenes(store))
+
+
+def test_without_numcodecs_the_way_out_is_said(tmp_path, monkeypatch):
+    store = lyft.write(tmp_path, lyft.records())
+    monkeypatch.setitem(sys.modules, "numcodecs.blosc", None)
+    with pytest.raises(MissingDependencyError, match=r"stylesim\[lyft\]"):
+        list(scenes(store))
+
+
+def test_the_real_sample(shared_data):
+    folder = shared_data / "lyft"
+    if not folder.is_dir():
+        pytest.skip(f"no Lyft sample at {folder}")
+    (scene,) = scenes(folder)
+    assert scene.counts["rows_in"] == 20802 + 248
+    assert scene.tracks.n_frames == 248
+    assert scene.counts["rows_dropped_implausible"] == 1033  # unknown things wider than a lane: hedges and walls
+    ego = scene.tracks.select(scene.tracks.flagged(TrackFlag.EGO))
+    assert ego.valid.all()
+    assert 5.0 < ego.speed_mps.mean() < 15.0
