@@ -15,6 +15,7 @@ from stylesim.cli import (
     corpora,
     describing,
     examining,
+    exporting,
     forecasting,
     generating,
     labelling,
@@ -56,7 +57,18 @@ app = typer.Typer(
     pretty_exceptions_enable=False,
     rich_markup_mode="rich",
 )
-for module in (generating, corpora, labelling, measuring, safety, forecasting, examining, describing, replaying):
+for module in (
+    generating,
+    corpora,
+    labelling,
+    measuring,
+    safety,
+    forecasting,
+    examining,
+    exporting,
+    describing,
+    replaying,
+):
     module.add_to(app)
 
 

@@ -76,7 +76,7 @@ class LaneApi(Protocol):
 
 @runtime_checkable
 class SumoApi(Protocol):
-    """The part of libsumo used here."""
+    """The part of a running simulation used here, by libsumo or by TraCI."""
 
     vehicle: VehicleApi
     vehicletype: VehicleTypeApi
@@ -84,13 +84,18 @@ class SumoApi(Protocol):
     trafficlight: TrafficLightApi
     lane: LaneApi
 
+
+@runtime_checkable
+class SumoModule(SumoApi, Protocol):
+    """libsumo itself, which can also start and end a simulation."""
+
     def start(self, cmd: list[str]) -> Any: ...  # noqa: D102
     def load(self, args: list[str]) -> Any: ...  # noqa: D102
     def simulationStep(self) -> Any: ...  # noqa: D102, N802
     def close(self) -> Any: ...  # noqa: D102
 
 
-def import_libsumo() -> SumoApi:
+def import_libsumo() -> SumoModule:
     """libsumo; MissingDependencyError with the command that helps where it cannot be imported."""
     os.environ.setdefault("LIBSUMO_AS_TRACI", "quiet")
     try:
@@ -104,7 +109,7 @@ def import_libsumo() -> SumoApi:
             f"libsumo cannot be loaded: {error}. It needs the system libraries {SYSTEM_LIBRARIES}; "
             f"on Debian or Ubuntu: apt-get install {DEBIAN_PACKAGES}"
         ) from None
-    return cast("SumoApi", libsumo)
+    return cast("SumoModule", libsumo)
 
 
 class Engine:

@@ -75,6 +75,14 @@ class Recorder:
         self._shown: dict[str, list[int]] = {name: [] for name in signals}
         self._events = _Events()
 
+    def take_in(self, names: Sequence[str], step: int) -> None:
+        """Vehicles that were on the road before the first step that is recorded, as if they had departed in `step`."""
+        for name in names:
+            self._number[name] = len(self._depart)
+            self._depart.append(step)
+            self._here[name] = self._number[name]
+        self._unseen.extend(names)
+
     def after_step(self, step: int) -> None:
         """Takes what the step brought."""
         self._follow_traffic(step)
@@ -98,11 +106,7 @@ class Recorder:
         """Keeps the list of vehicles on the road; only steps with entries or exits cost more than three calls."""
         departed = self._sumo.simulation.getDepartedIDList()
         arrived = self._sumo.simulation.getArrivedIDList()
-        for name in departed:
-            self._number[name] = len(self._depart)
-            self._depart.append(step)
-            self._here[name] = self._number[name]
-        self._unseen.extend(departed)
+        self.take_in(departed, step)
         for name in arrived:
             self._here.pop(name, None)
         gone = self._sumo.vehicle.getIDCount() != len(self._here)

@@ -19,11 +19,17 @@ from stylesim.tracks import TrackFlag, Tracks
 SETTLING_S = 3.0  # after insertion, not logged: SUMO's vehicles find their speed and lane in that time
 
 
-def scene_of(log: RawLog, decisions: list[DecisionEvent], files: Episode, *, name: str) -> Scene:
-    """The scene of the frames after the warm-up; the first 3 s after each vehicle's insertion are not logged."""
+def scene_of(
+    log: RawLog, decisions: list[DecisionEvent], files: Episode, *, name: str, bodies: Bodies | None = None
+) -> Scene:
+    """The scene of the frames after the warm-up; the first 3 s after each vehicle's insertion are not logged.
+
+    `bodies` are those of the log, where several scenes are cut from it and they were made before.
+    """
     warm, frames = round(files.warm_up_s / DT_S), round(files.duration_s / DT_S)
     signals = _signals(log, files, start=warm, frames=frames)
-    tracks, counts = _tracks(log, decisions, files, signals, warm=warm, frames=frames)
+    bodies = bodies_of(log, files) if bodies is None else bodies
+    tracks, counts = _tracks(bodies, log, decisions, files, signals, warm=warm, frames=frames)
     counts["drivers"] = len(files.drivers)
     counts["not_inserted"] = len(files.drivers) - len(log.driver_ids)
     scene_id = f"{name}-{files.seed}-{files.episode:05d}"
@@ -47,18 +53,24 @@ def _signals(log: RawLog, files: Episode, *, start: int, frames: int) -> Signals
 
 
 def _tracks(
-    log: RawLog, decisions: list[DecisionEvent], files: Episode, signals: Signals | None, *, warm: int, frames: int
+    bodies: Bodies,
+    log: RawLog,
+    decisions: list[DecisionEvent],
+    files: Episode,
+    signals: Signals | None,
+    *,
+    warm: int,
+    frames: int,
 ) -> tuple[Tracks, dict[str, int]]:
     """The tracks of the drivers with a logged frame, and what is counted of them."""
-    bodies = bodies_of(log, files)
     settled = bodies.step - log.depart_step[bodies.driver] >= round(SETTLING_S / DT_S)
-    in_time = bodies.step >= warm
+    in_time = (bodies.step >= warm) & (bodies.step < warm + frames)
     logged = settled & in_time & ~bodies.segments.is_first()
     lanes = {lane.lane_id: lane for lane in files.network.road.lanes}
     flags = flags_of(bodies, log, logged=logged, first_step=warm, signals=signals, lanes=lanes, decisions=decisions)
     keep = np.flatnonzero(np.bincount(bodies.driver[logged], minlength=len(log.driver_ids)))
     tracks = _dense(bodies, files, log.driver_ids, flags, logged=logged, keep=keep, warm=warm, frames=frames)
-    counts = _counts(tracks, log, warm)
+    counts = _counts(tracks, log, range(warm, warm + frames))
     counts["settling_steps_dropped"] = int((in_time & ~logged).sum())
     return tracks, counts | _overlap_counts(bodies, files, log.driver_ids, logged)
 
@@ -98,13 +110,13 @@ def _dense(
     )
 
 
-def _counts(tracks: Tracks, log: RawLog, warm: int) -> dict[str, int]:
+def _counts(tracks: Tracks, log: RawLog, steps: range) -> dict[str, int]:
     """Flags by name (tracks that carry them), and collisions by pair."""
     names = {flag.name.lower(): flag for flag in TrackFlag if flag.name is not None}
     outcomes = ("emergency_braked", "ran_red", "teleported", "removed", "collided")
     answers = ("decided_stop", "decided_go", "stopped_at_line", "crossed_on_yellow")
     counts = {name: int(tracks.flagged(names[name]).sum()) for name in outcomes + answers}
-    counts["collisions"] = len({tuple(sorted(pair)) for step, *pair in log.collisions if step >= warm})
+    counts["collisions"] = len({tuple(sorted(pair)) for step, *pair in log.collisions if step in steps})
     return counts
 
 
