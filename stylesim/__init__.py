@@ -42,6 +42,7 @@ _HOME = {
     "merge": "stylesim.merging.merge",
     "populate": "stylesim.plugins.populate",
     "read": "stylesim.datasets.reading",
+    "realism": "stylesim.evaluation.realism",
     "train": "stylesim.forecasting.training",
     "verify": "stylesim.corpus.verify",
 }

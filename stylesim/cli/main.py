@@ -12,6 +12,7 @@ from typer.core import TyperGroup
 
 from stylesim import __version__
 from stylesim.cli import (
+    comparing,
     corpora,
     describing,
     examining,
@@ -63,6 +64,7 @@ for module in (
     labelling,
     measuring,
     safety,
+    comparing,
     forecasting,
     examining,
     exporting,

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Float64, Int64
 
-from stylesim.kinematics import Leaders, motion
+from stylesim.kinematics import Leaders, Motion, motion
 from stylesim.labelers import cuts, lanes
 from stylesim.labelers.features import road_index
 from stylesim.labelers.options import FeatureOptions
@@ -22,8 +22,8 @@ class Following:
     gap_m: Float64[np.ndarray, "agent time"]
     speed_mps: Float64[np.ndarray, "agent time"]
     leader_speed_mps: Float64[np.ndarray, "agent time"]
-    acceleration_mps2: Float64[np.ndarray, "agent time"]
-    jerk_mps3: Float64[np.ndarray, "agent time"]
+    motion: Motion
+    lane: Int64[np.ndarray, "agent time"]  # place among the road's lanes, -1 without one
     offset_m: Float64[np.ndarray, "agent time"]  # from the centre of its lane, left positive; NaN without a lane
 
 
@@ -44,7 +44,7 @@ def following(scene: Scene, options: FeatureOptions | None = None) -> Following:
         gap_m=ahead.gap_m,
         speed_mps=moved.speed_mps,
         leader_speed_mps=np.where(ahead.leader >= 0, of_leader, np.nan),
-        acceleration_mps2=moved.acceleration_mps2,
-        jerk_mps3=moved.jerk_mps3,
+        motion=moved,
+        lane=np.full(vehicle.shape, -1) if found is None else found.lane[..., 0].astype(np.int64),
         offset_m=np.full(vehicle.shape, np.nan) if found is None else found.offset_m[..., 0].astype(np.float64),
     )

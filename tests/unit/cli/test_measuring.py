@@ -35,3 +35,18 @@ def test_criticality_of_a_corpus_without_styles_or_population(stylesim, tmp_path
     said = stylesim("criticality", path, "--out", tmp_path / "c.json")
     assert said.code == 0 and "Per 1,000 km" in said.out
     assert json.loads((tmp_path / "c.json").read_text())["format"] == "stylesim-criticality"
+
+
+def test_realism_of_two_corpora_and_wrong_endings(stylesim, tmp_path):
+    paths = []
+    for number in range(2):
+        paths.append(tmp_path / f"c{number}")
+        with CorpusWriter(paths[-1], source="made", configuration={"k": number}, seed=number) as writer:
+            for i in range(4):
+                writer.add(make_scene(f"s{i}", n_agents=9, n_frames=80, seed=10 * number + i))
+            writer.finish()
+    assert stylesim("realism", *paths, "--out", tmp_path / "r.csv").code == 2
+    assert stylesim("realism", *paths, "--report", tmp_path / "r.csv").code == 2
+    said = stylesim("realism", *paths, "--out", tmp_path / "r.json", "--report", tmp_path / "r.html")
+    assert said.code == 0 and "real against real" in said.out
+    assert json.loads((tmp_path / "r.json").read_text())["format"] == "stylesim-realism"
