@@ -81,7 +81,10 @@ def _spread(value: Spread, digits: int = 2) -> Cell:
 def _section(one: Comparison, sim: Profile, real: Profile, *, number: int) -> Section:
     what = "stretches of time within one or few units" if one.within_unit else "units"
     text = f"{plural(one.blocks, 'block')} of the recording ({what})."
-    blocks = picture(densities_figure(sim, real), f"Matched to {one.real} by speed and density; filled: the recording.")
+    blocks = picture(
+        densities_figure(sim, real),
+        f"Matched to {one.real} by speed and density; filled: the recording; values beyond the axis are not drawn.",
+    )
     blocks += [Block(table=_distances(one)), Block(table=_targets(one)), Block(table=_styles(one), fold=True)]
     return Section(f"real{number}", f"Against {one.real}", (text,) if number else (HOW, text), tuple(blocks))
 
@@ -153,8 +156,9 @@ def densities_figure(sim: Profile, real: Profile) -> Figure:
             middle = one.low + one.width * (np.arange(BINS) + 0.5)
             a, b, _ = distances.matched(ours[:, k], theirs[:, k])
             if a.sum() > 0 and b.sum() > 0:
-                axes.fill_between(middle, b / b.sum() / one.width, step="mid", color=SERIES_COLOUR[0], alpha=0.25, lw=0)
-                axes.step(middle, a / a.sum() / one.width, where="mid", color=SERIES_COLOUR[1], lw=1.3)
+                p, q = a[:-1] / a.sum() / one.width, b[:-1] / b.sum() / one.width  # the last bin holds all beyond
+                axes.fill_between(middle[:-1], q, step="mid", color=SERIES_COLOUR[0], alpha=0.25, lw=0)
+                axes.step(middle[:-1], p, where="mid", color=SERIES_COLOUR[1], lw=1.3)
             axes.set_title(one.title, fontsize=8.5)
             axes.set_xlabel(one.unit)
             axes.set_yticks([])
