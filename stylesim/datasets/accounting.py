@@ -21,9 +21,16 @@ class AccountingError(StylesimError):
     exit_code = 70
 
 
-def row_counts(*, rows_out: int, dropped: Mapping[str, int] | None = None) -> dict[str, int]:
-    """The counts of a scene that kept `rows_out` source rows and dropped `dropped` (reason -> rows)."""
+def row_counts(
+    *, rows_out: int, dropped: Mapping[str, int] | None = None, rows_in: int | None = None
+) -> dict[str, int]:
+    """The counts of a scene that kept `rows_out` source rows and dropped `dropped` (reason -> rows).
+
+    `rows_in` is what the reader counted in the source. Raises AccountingError where rows vanished unsaid.
+    """
     lost = {DROPPED + reason: int(n) for reason, n in (dropped or {}).items() if n}
+    if rows_in is not None and rows_in != rows_out + sum(lost.values()):
+        raise AccountingError(f"{rows_in} rows in, but {rows_out} out and dropped: {lost}")
     return {ROWS_IN: int(rows_out) + sum(lost.values()), ROWS_OUT: int(rows_out), **lost}
 
 

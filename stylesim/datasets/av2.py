@@ -134,7 +134,7 @@ def _scene(folder: Path, split: str) -> Scene:
         source_scenario_id=scenario_id,
         official_split=split,
         t0_frame=T0_FRAME,
-        counts=row_counts(rows_out=table.height, dropped=dropped),
+        counts=row_counts(rows_in=raw.height, rows_out=table.height, dropped=dropped),
     )
 
 

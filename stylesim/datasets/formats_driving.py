@@ -15,6 +15,18 @@ FORMATS = (
         where="https://www.argoverse.org/av2.html",
     ),
     DatasetFormat(
+        name="av2_sensor",
+        module="stylesim.datasets.av2_sensor",
+        description="Argoverse 2 sensor logs: boxes of 15 s at 10 Hz with map (Feather, JSON)",
+        supports="annotations.feather, city_SE3_egovehicle.feather, map/log_map_archive_*.json; train, val, test",
+        tested_on="documentation",
+        rate_hz=10.0,
+        has_map=True,
+        has_signals=False,
+        licence="CC BY-NC-SA 4.0",
+        where="https://www.argoverse.org/av2.html",
+    ),
+    DatasetFormat(
         name="womd",
         module="stylesim.datasets.womd",
         description="Waymo Open Motion: 9 s scenarios with map and lights (TFRecord)",

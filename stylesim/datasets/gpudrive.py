@@ -97,7 +97,7 @@ def _scene(document: Mapping[str, Any], file: Path) -> Scene:
         source_scenario_id=scenario_id,
         official_split=split_of(file.name),
         t0_frame=T0_FRAME if n_frames > T0_FRAME else None,
-        counts=row_counts(rows_out=int(tracks.valid.sum()), dropped=dropped),
+        counts=row_counts(rows_in=int(valid.sum()), rows_out=int(tracks.valid.sum()), dropped=dropped),
     )
 
 

@@ -142,5 +142,9 @@ def _scene(
         start_s=start_s,
         source_scenario_id=str(number),
         official_split={"train": "train", "validate": "val", "test": "test"}.get(store.stem, ""),
-        counts=row_counts(rows_out=int(tracks.valid.sum()), dropped={"duplicate": duplicates, **dropped}),
+        counts=row_counts(
+            rows_in=len(agents) + len(frames),
+            rows_out=int(tracks.valid.sum()),
+            dropped={"duplicate": duplicates, **dropped},
+        ),
     )

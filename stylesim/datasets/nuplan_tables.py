@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 from jaxtyping import Bool, Float64, Int64
 
+from stylesim.datasets.accounting import row_counts
 from stylesim.datasets.clocks import frames_of
 from stylesim.datasets.recording import Recording, SignalLog
 from stylesim.datasets.rows import usable
@@ -82,6 +83,7 @@ def log_of(file: Path) -> Log:
     grid = frames_of(clock / 1e6 - clock[0] / 1e6, STEP_S, file)
     rows, dropped = _joined(_ego(frames), boxes)
     recording = _recording(file, rows, clock, grid, dropped, _signals(lights, clock, grid))
+    row_counts(rows_in=len(frames) + len(boxes), rows_out=len(recording.frame), dropped=recording.dropped)  # checks
     return Log(recording, str(location[0] or "nuplan"))
 
 

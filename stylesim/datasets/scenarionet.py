@@ -77,5 +77,5 @@ def _scene(document: Mapping[str, Any], file: Path) -> Scene:
         signals=signals,
         source_scenario_id=scenario_id,
         t0_frame=int(t0) if t0 is not None and 0 <= int(t0) < tracks.n_frames else None,
-        counts=row_counts(rows_out=int(tracks.valid.sum()), dropped={**read.dropped, **dropped}),
+        counts=row_counts(rows_in=read.rows, rows_out=int(tracks.valid.sum()), dropped={**read.dropped, **dropped}),
     )

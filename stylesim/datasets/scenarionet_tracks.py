@@ -44,6 +44,7 @@ class TrackArrays:
 
     arrays: dict[str, Any]
     dropped: dict[str, int]
+    rows: int  # valid agent-frames of the source
 
 
 def units_of(meta: Mapping[str, Any], dataset: str, scenario_id: str) -> str:
@@ -84,6 +85,7 @@ def tracks_of(document: Mapping[str, Any], file: Path) -> TrackArrays:
     ego = str(meta.get("sdc_id", ""))
     is_ego = np.array([str(key) == ego for key in tracks])
     dropped: dict[str, int] = {}
+    rows = int(valid.sum())
     ahead = None
     if str(meta.get("dataset")) == "nuscenes":
         velocity, ahead = _from_key_frames(position, valid, is_ego)
@@ -102,7 +104,7 @@ def tracks_of(document: Mapping[str, Any], file: Path) -> TrackArrays:
         "flags": _flags(tracks, is_ego, meta.get("tracks_to_predict") or {}),
         "lookahead_steps": ahead,
     }
-    return TrackArrays(arrays, dropped)
+    return TrackArrays(arrays, dropped, rows)
 
 
 def _column(values: Any, n: int, width: int, file: Path) -> np.ndarray:

@@ -77,7 +77,7 @@ def scene_of_example(data: bytes, message: wire.Fields, file: Path, name: str, s
         source_scenario_id=scenario_id,
         official_split=split,
         t0_frame=T0_FRAME,
-        counts=row_counts(rows_out=int(tracks.valid.sum()), dropped=dropped),
+        counts=row_counts(rows_in=int(valid.sum()), rows_out=int(tracks.valid.sum()), dropped=dropped),
     )
 
 

@@ -80,7 +80,7 @@ def scene_of_scenario(data: bytes, message: wire.Fields, file: Path, split: str)
         source_scenario_id=scenario_id,
         official_split=split,
         t0_frame=t0,
-        counts=row_counts(rows_out=int(tracks.valid.sum()), dropped=dropped),
+        counts=row_counts(rows_in=int(valid.sum()), rows_out=int(tracks.valid.sum()), dropped=dropped),
     )
 
 
