@@ -66,7 +66,7 @@ def _scene(folder: Path, split: str) -> Scene:
 def _of(boxes: Boxes, folder: Path, file: Path, split: str) -> Scene:
     grid = boxes.grid
     valid = grid.valid.copy()
-    velocity, ahead = causal_velocity(grid.position_m, valid, DT_S, STRIDE)
+    velocity, ahead = causal_velocity(grid.position_m, valid, np.arange(valid.shape[1]) * DT_S, STRIDE)
     unknown = valid & np.isnan(velocity).any(-1) & np.isfinite(grid.position_m).all(-1)
     valid &= ~unknown
     origin = origin_of(grid.position_m, grid.valid)

@@ -109,7 +109,7 @@ def _scene(
     valid[0, clock] = True
     position[0, clock], size[0] = frames["ego_translation"][:, :2], EGO_SIZE_M
     heading[0, clock] = np.arctan2(frames["ego_rotation"][:, 1, 0], frames["ego_rotation"][:, 0, 0])
-    velocity[:1], ahead = causal_velocity(position[:1], valid[:1], DT_S, POSE_STRIDE)
+    velocity[:1], ahead = causal_velocity(position[:1], valid[:1], np.arange(shape[1]) * DT_S, POSE_STRIDE)
     lookahead = np.zeros(shape, np.int64)
     lookahead[0] = ahead[0]
     flags = np.zeros(shape[0], np.int32)

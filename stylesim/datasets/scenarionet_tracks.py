@@ -136,9 +136,9 @@ def _flags(tracks: Mapping[str, Any], is_ego: np.ndarray, predicted: Any) -> np.
 def _from_key_frames(position: np.ndarray, valid: np.ndarray, measured: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Velocities from key frames, and how far each frame looks ahead; `measured` agents have every frame."""
     n = valid.shape[1]
-    velocity, ahead = causal_velocity(position, valid, DT_S, POSE_STRIDE)
+    velocity, ahead = causal_velocity(position, valid, np.arange(n) * DT_S, POSE_STRIDE)
     keys = np.arange(0, n, KEY_STEPS)
-    at_keys, keys_ahead = causal_velocity(position[:, keys], valid[:, keys], DT_S * KEY_STEPS)
+    at_keys, keys_ahead = causal_velocity(position[:, keys], valid[:, keys], keys * DT_S)
     frame = np.arange(n)
     before = np.minimum(frame // KEY_STEPS, len(keys) - 1)
     after = np.minimum(-(-frame // KEY_STEPS), len(keys) - 1)
