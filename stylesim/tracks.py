@@ -43,6 +43,8 @@ class TrackFlag(IntFlag):
     FOCAL = 512
     STOPPED_AT_LINE = 1024
     CROSSED_ON_YELLOW = 2048
+    STRESSOR = 4096  # did something unusual because the episode asked for it, or is who walked there
+    STRESSED = 8192  # to whom it was done
 
 
 @dataclass(frozen=True, eq=False)

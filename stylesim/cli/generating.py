@@ -9,7 +9,7 @@ import typer
 from stylesim.cli.console import progress_bar, say, show_table
 from stylesim.errors import InputError, unknown
 from stylesim.population import Population
-from stylesim.simulation.plan import TwinRequest
+from stylesim.simulation.plan import EpisodePlan, TwinRequest, stressors_of
 from stylesim.style import STYLE_CLASSES
 
 
@@ -77,12 +77,18 @@ def generate(
     ),
     twin_style: str = typer.Option("", help="The class that the twin's driver gets.", show_default="drawn"),
     twin_null: bool = typer.Option(True, help="And a second twin: the same driver and style with other noise."),
+    stressor: str = typer.Option(
+        "",
+        help="Unusual events at seeded moments, KIND or KIND:SHARE of the episodes, separated by commas: "
+        "hard_brake, cut_in, jaywalker, deer, stalled, red_runner.",
+    ),
 ) -> None:
     """Generate traffic with drivers of chosen styles into a new corpus."""
     from stylesim.simulation.generate import generate as run
 
     crowd = chosen_population(population, styles, reweight)
     twins = wanted_twins(twins_at, twins_from, twin_style, null=twin_null)
+    plan = EpisodePlan(stressors=stressors_of(stressor) if stressor else ())
     with progress_bar("generating", "episodes") as progress:
         corpus = run(
             scenario,
@@ -92,6 +98,7 @@ def generate(
             out=out,
             workers=workers,
             resume=resume,
+            plan=plan,
             twins=twins,
             progress=progress,
         )

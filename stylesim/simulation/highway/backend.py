@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from stylesim.errors import InputError
 from stylesim.population import Population
 from stylesim.randomness import stream
 from stylesim.scenario import Scenario
@@ -32,6 +33,8 @@ class HighwayBackend:
         self, scenario: Scenario, population: Population, *, seed: int, episode: int, plan: EpisodePlan = PLAIN
     ) -> Scene:
         """One episode at 10 Hz; the same arguments give the same scene. InputError for options that do not fit."""
+        if plan.stressors:
+            raise InputError(f"scenario {scenario.name!r}: the backend 'highway' has no stressors yet; SUMO has")
         options = options_of(scenario)
         drawn = scenario.draw(stream(seed, episode, "", "parameters"))
         crew = Crew(population, seed=seed, episode=episode, twin=plan.twin)

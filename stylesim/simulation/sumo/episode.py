@@ -71,6 +71,7 @@ class EpisodeFiles(Episode):
     route_path: Path
     additional_path: Path | None  # the signal programmes, where the scenario has plans for signals
     options: SumoOptions
+    plan: EpisodePlan = PLAIN
 
 
 def prepare_episode(
@@ -108,6 +109,7 @@ def prepare_episode(
         warm_up_s=scenario.warm_up_s,
         duration_s=scenario.duration_s,
         twin=plan.twin,
+        plan=plan,
         now={driver.driver_id: driver for driver in drivers},
     )
 

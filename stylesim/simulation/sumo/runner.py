@@ -9,11 +9,13 @@ from stylesim.population import Population
 from stylesim.scenario import Scenario
 from stylesim.scene import Scene
 from stylesim.simulation.plan import PLAIN, EpisodePlan
+from stylesim.simulation.stressors import check_possible, with_events
 from stylesim.simulation.sumo.engine import Engine
 from stylesim.simulation.sumo.episode import DT_S, EpisodeFiles, prepare_episode, sumo_options
 from stylesim.simulation.sumo.recorder import RawLog, Recorder
 from stylesim.simulation.sumo.scenes import scene_of
 from stylesim.simulation.sumo.stopzone import StopZone
+from stylesim.simulation.sumo.stressing import Stressing
 from stylesim.simulation.sumo.switching import StyleSwitch
 from stylesim.simulation.sumo.yellow import DecisionEvent, YellowController
 
@@ -41,10 +43,13 @@ class SumoBackend:
         """
         with tempfile.TemporaryDirectory(prefix="stylesim-") as folder:
             files = prepare_episode(scenario, population, seed=seed, episode=episode, folder=Path(folder), plan=plan)
-            log, decisions = self.simulate(files)
-        return plan.applied_to(scene_of(log, decisions, files, name=scenario.name))
+            check_possible(plan, files.network.road, scenario.name)
+            stressing = Stressing(self._engine.sumo, files)
+            log, decisions = self.simulate(files, stressing)
+        scene = scene_of(log, decisions, files, name=scenario.name)
+        return plan.applied_to(with_events(scene, stressing.outcome(), plan))
 
-    def simulate(self, files: EpisodeFiles) -> tuple[RawLog, list[DecisionEvent]]:
+    def simulate(self, files: EpisodeFiles, stressing: Stressing | None = None) -> tuple[RawLog, list[DecisionEvent]]:
         """Steps through a prepared episode; what was logged and what was decided at yellow lights."""
         engine = self._engine
         engine.load(sumo_options(files))
@@ -56,6 +61,8 @@ class SumoBackend:
             switch.before_step(step)
             yellow.before_step(step)
             zone.before_step(step)
+            if stressing is not None:
+                stressing.before_step(step)
             engine.step()
             recorder.after_step(step)
         return recorder.finish(), yellow.events
