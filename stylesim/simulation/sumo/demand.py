@@ -10,7 +10,6 @@ import numpy as np
 from stylesim.errors import SimulationError
 from stylesim.population import Population
 from stylesim.randomness import stream
-from stylesim.scenario import Scenario
 from stylesim.simulation.sumo.options import Flow, SumoOptions
 from stylesim.simulation.sumo.roads import RoadNetwork
 from stylesim.simulation.sumo.signals import ONSET_S
@@ -44,7 +43,7 @@ def _departures(flow: Flow, arrivals: Arrivals) -> Iterator[float]:
         time += shortest + float(rng.exponential(mean - shortest))
 
 
-def _driver(flow: Flow, number: int, depart_s: float, population: Population, arrivals: Arrivals) -> Driver:
+def drawn_driver(flow: Flow, number: int, depart_s: float, population: Population, arrivals: Arrivals) -> Driver:
     """One driver; each of its draws has a stream of its own, so that another driver shifts none."""
     name = f"{flow.name}.{number}"
     ways = list(flow.to)
@@ -59,21 +58,12 @@ def _driver(flow: Flow, number: int, depart_s: float, population: Population, ar
     return Driver(name, style, kind, length, width, depart_s, f"{flow.enter} {way}".strip())
 
 
-def draw_drivers(
-    scenario: Scenario,
-    options: SumoOptions,
-    population: Population,
-    *,
-    seed: int,
-    episode: int,
-    parameters: Mapping[str, float],
-) -> tuple[Driver, ...]:
-    """Every driver of the episode by time of entry."""
-    until_s = scenario.warm_up_s + scenario.duration_s * options.last_entry_share
-    arrivals = Arrivals(seed, episode, until_s, parameters)
+def draw_drivers(options: SumoOptions, population: Population, arrivals: Arrivals) -> tuple[Driver, ...]:
+    """Every driver who comes as a share of the demand, by time of entry."""
     drivers = [
-        _driver(flow, number, time, population, arrivals)
+        drawn_driver(flow, number, time, population, arrivals)
         for flow in options.flows
+        if flow.onset_tts_s is None
         for number, time in enumerate(_departures(flow, arrivals))
     ]
     return tuple(sorted(drivers, key=lambda driver: (driver.depart_s, driver.driver_id)))
@@ -87,6 +77,13 @@ def check_routes(options: SumoOptions, network: RoadNetwork, *, name: str) -> No
                 raise SimulationError(
                     f"scenario {name!r}: flow {flow.name!r} uses edge {edge!r}; known: {', '.join(network.edges)}"
                 )
+
+
+def _entry_xml(driver: Driver) -> str:
+    entry = driver.entry
+    if entry is None:
+        return 'departLane="best" departSpeed="max" departPos="base"'
+    return f'departLane="{entry.lane}" departSpeed="{entry.speed_mps:.3f}" departPos="{entry.position_m:.3f}"'
 
 
 def type_xml(driver: Driver) -> str:
@@ -103,6 +100,6 @@ def routes_xml(drivers: tuple[Driver, ...], others: tuple[Driver, ...] = ()) -> 
         lines.append(type_xml(driver))
         lines.append(
             f'<vehicle id="{driver.driver_id}" type="{driver.driver_id}" depart="{driver.depart_s:.1f}"'
-            f' departLane="best" departSpeed="max" departPos="base"><route edges="{driver.route}"/></vehicle>'
+            f' {_entry_xml(driver)}><route edges="{driver.route}"/></vehicle>'
         )
     return "\n".join([*lines, "</routes>", ""])

@@ -14,11 +14,12 @@ from stylesim.randomness import stream
 from stylesim.scenario import Scenario
 from stylesim.simulation.driving import HARDEST_BRAKING_MPS2
 from stylesim.simulation.plan import PLAIN, EpisodePlan, Twin, salted
-from stylesim.simulation.sumo.demand import check_routes, draw_drivers, routes_xml
+from stylesim.simulation.sumo.demand import Arrivals, check_routes, draw_drivers, routes_xml
+from stylesim.simulation.sumo.dilemma import dilemma_drivers
 from stylesim.simulation.sumo.network import compiled_network
 from stylesim.simulation.sumo.options import SumoOptions, sumo_options_of
 from stylesim.simulation.sumo.roads import RoadNetwork, read_network
-from stylesim.simulation.sumo.signals import programme_of, programmes_xml
+from stylesim.simulation.sumo.signals import Programme, programme_of, programmes_xml
 from stylesim.simulation.sumo.vehicles import Driver
 
 DT_S = 0.1
@@ -86,15 +87,18 @@ def prepare_episode(
     path = compiled_network(scenario, options, speed_limit_mps=parameters["speed_limit_mps"])
     network = read_network(path)
     check_routes(options, network, name=scenario.name)
-    drivers = draw_drivers(scenario, options, population, seed=seed, episode=episode, parameters=parameters)
+    programmes = _programmes(options, network, parameters, seed=seed, episode=episode)
+    until_s = scenario.warm_up_s + scenario.duration_s * options.last_entry_share
+    arrivals = Arrivals(seed, episode, until_s, parameters)
+    drivers = draw_drivers(options, population, arrivals)
+    drivers += dilemma_drivers(options, network, programmes, population, arrivals)
+    drivers = tuple(sorted(drivers, key=lambda driver: (driver.depart_s, driver.driver_id)))
     routes = folder / "routes.rou.xml"
     drivers, others = _with_twin(drivers, plan.twin)
     routes.write_text(routes_xml(drivers, others), encoding="utf-8")
     additional = None
-    if options.signals:
-        share = float(stream(seed, episode, "", "signal offset").random())
+    if programmes:
         additional = folder / "signals.add.xml"
-        programmes = [programme_of(plan, network, parameters, offset_share=share) for plan in options.signals]
         additional.write_text(programmes_xml(programmes), encoding="utf-8")
     return EpisodeFiles(
         network_path=path,
@@ -112,6 +116,14 @@ def prepare_episode(
         plan=plan,
         now={driver.driver_id: driver for driver in drivers},
     )
+
+
+def _programmes(
+    options: SumoOptions, network: RoadNetwork, parameters: Mapping[str, float], *, seed: int, episode: int
+) -> list[Programme]:
+    """The programmes of the signals that the scenario plans; they share where in the cycle the episode begins."""
+    share = float(stream(seed, episode, "", "signal offset").random())
+    return [programme_of(plan, network, parameters, offset_share=share) for plan in options.signals]
 
 
 def _with_twin(drivers: tuple[Driver, ...], twin: Twin | None) -> tuple[tuple[Driver, ...], tuple[Driver, ...]]:

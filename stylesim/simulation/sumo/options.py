@@ -11,7 +11,8 @@ from stylesim.errors import InputError, unknown
 from stylesim.scenario import Scenario
 from stylesim.specs import Spec, parse
 
-PARAMETERS = ("speed_limit_mps", "demand_vph", "truck_share")
+PARAMETERS = ("speed_limit_mps", "truck_share")
+DEMAND_PARAMETERS = ("demand_vph",)
 SIGNAL_PARAMETERS = ("cycle_s", "first_green_share", "yellow_s", "all_red_s")
 
 
@@ -37,20 +38,34 @@ class EdgeType(Spec):
 
 
 class Flow(Spec):
-    """Vehicles that enter by one edge: `share` of the demand, spread over the ways `to`."""
+    """Vehicles that enter by one edge: `share` of the demand, spread over the ways `to`.
+
+    With `onset_tts_s` they come one by one instead: each lane's signal turns yellow when a vehicle of its own is that
+    long (drawn between the two numbers, in s) before its stop line, with nobody ahead of it (`dilemma`).
+    """
 
     name: str = Field(pattern=r"^[a-z_]{1,8}$")
     enter: str
-    share: float = Field(gt=0, le=1)
+    share: float = Field(default=0.0, ge=0, le=1)
+    onset_tts_s: tuple[float, float] | None = None
     to: dict[str, float] = Field(min_length=1)  # rest of the route, edges with spaces between (or none) -> weight
     trucks: bool = True
+
+    @model_validator(mode="after")
+    def _arrivals(self) -> Flow:
+        if (self.onset_tts_s is None) != (self.share > 0):
+            raise ValueError("give either share or onset_tts_s")
+        if self.onset_tts_s is not None and not 0.0 < self.onset_tts_s[0] <= self.onset_tts_s[1]:
+            raise ValueError(f"onset_tts_s must be two rising positive numbers, not {self.onset_tts_s}")
+        return self
 
 
 class SignalPlan(Spec):
     """A fixed-time signal: `groups` of movements get green one after the other.
 
-    A movement is an entering edge, or an edge with SUMO's letters of the directions meant: `west_in:sr`. The first
-    group gets `first_green_share` of the greens, the others share the rest by `weights` (equal ones by default).
+    A movement is an entering edge, or an edge with SUMO's letters of the directions meant: `west_in:sr`; a group
+    without movements is the pedestrians' (everybody has red). The first group gets `first_green_share` of the greens,
+    the others share the rest by `weights` (equal ones by default).
     """
 
     junction: str
@@ -77,10 +92,15 @@ class SumoOptions(Spec):
         default=1.0, gt=0, le=1
     )  # of the logged time; who came later would be seen too short
 
+    @property
+    def has_demand(self) -> bool:
+        """Whether any flow is a share of the demand."""
+        return any(flow.onset_tts_s is None for flow in self.flows)
+
     @model_validator(mode="after")
     def _shares(self) -> SumoOptions:
         total = sum(flow.share for flow in self.flows)
-        if abs(total - 1.0) > 1e-6:
+        if self.has_demand and abs(total - 1.0) > 1e-6:
             raise ValueError(f"the shares of the flows sum to {total:.6g}, not 1")
         if len({flow.name for flow in self.flows}) != len(self.flows):
             raise ValueError("two flows have the same name")
@@ -93,7 +113,8 @@ def sumo_options_of(scenario: Scenario) -> SumoOptions:
     """The checked options of a scenario; InputError naming the field, or the parameter that is missing or unknown."""
     where = scenario.folder / "scenario.yaml"
     options = parse(SumoOptions, scenario.options, f"{where}: options")
-    wanted = PARAMETERS + (SIGNAL_PARAMETERS if options.signals else ())
+    wanted = PARAMETERS + (DEMAND_PARAMETERS if options.has_demand else ())
+    wanted += SIGNAL_PARAMETERS if options.signals else ()
     for name in scenario.parameters:
         if name not in wanted:
             raise unknown("parameter", name, wanted, where=where)

@@ -33,6 +33,18 @@ class Programme:
     offset_s: float
     phases: tuple[tuple[float, str], ...]
 
+    def yellow_onsets_s(self, link: int, until_s: float) -> list[float]:
+        """When that link turns from green to yellow, up to `until_s` on SUMO's clock."""
+        cycle = sum(duration for duration, _ in self.phases)
+        times: list[float] = []
+        at = self.offset_s % cycle - cycle
+        while at < until_s:
+            for number, (duration, state) in enumerate(self.phases):
+                if state[link] == "y" and self.phases[number - 1][1][link] in "Gg" and 0.0 <= at < until_s:
+                    times.append(round(at, 1))
+                at += duration
+        return times
+
     def xml(self) -> str:
         """The element that makes this programme the signal's own."""
         rows = [f'        <phase duration="{duration:.1f}" state="{state}"/>' for duration, state in self.phases]

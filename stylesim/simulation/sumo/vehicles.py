@@ -23,6 +23,15 @@ TRUCK_TOP_SPEED_MPS = 25.0  # 90 km/h, the limiter of lorries in Europe
 
 
 @dataclass(frozen=True)
+class Entry:
+    """Where on its first edge a driver enters, and how fast; without one SUMO chooses."""
+
+    lane: int
+    position_m: float  # of the front bumper
+    speed_mps: float
+
+
+@dataclass(frozen=True)
 class Driver:
     """One driver and vehicle of an episode; `style` is the commanded one, before what a truck cannot do."""
 
@@ -34,6 +43,7 @@ class Driver:
     depart_s: float
     route: str
     type_suffix: str = ""  # of a driver's second vehicle type (`switching`)
+    entry: Entry | None = None
 
     @property
     def type_id(self) -> str:

@@ -45,7 +45,6 @@ class YellowController:
     def __init__(self, sumo: SumoApi, files: Episode) -> None:
         self._sumo, self._files = sumo, files
         self._shown = dict.fromkeys(files.signals, "")
-        self._lane_of_link = {(link.signal, link.index): link.lane for link in files.network.links}
         self._changed: dict[str, tuple[str, int]] = {}  # driver -> the link whose green takes its change back
         self._decided: dict[str, YellowDecision] = {}  # and what it decided there
         self._times_decided: dict[str, int] = {}
