@@ -1,10 +1,10 @@
-"""What drivers did at the onset of yellow, read from their tracks: stopped before the line, or crossed; how, and when."""
+"""What drivers did at the onset of yellow, read from their tracks: stopped before the line, or crossed; and how."""
 
 from __future__ import annotations
 
-from collections import Counter
-from collections.abc import Iterable, Iterator
-from dataclasses import dataclass, fields
+from collections import Counter, defaultdict
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import dataclass
 
 import numpy as np
 from jaxtyping import Bool, Float, Float64, Int, Int64
@@ -46,12 +46,19 @@ class Approaches:
     def where(self, keep: Bool[np.ndarray, " row"]) -> Approaches:
         """The rows to keep."""
         rows = np.flatnonzero(keep).tolist()
-        picked = {name: tuple(getattr(self, name)[row] for row in rows) for name in ("style", "unit")}
-        arrays = {name: getattr(self, name)[keep] for name in COLUMNS}
-        return Approaches(**picked, **arrays, counts=self.counts)
-
-
-COLUMNS = tuple(f.name for f in fields(Approaches) if f.name not in ("style", "unit", "counts"))
+        return Approaches(
+            style=tuple(self.style[row] for row in rows),
+            unit=tuple(self.unit[row] for row in rows),
+            tts_s=self.tts_s[keep],
+            speed_mps=self.speed_mps[keep],
+            free=self.free[keep],
+            decided=self.decided[keep],
+            stopped=self.stopped[keep],
+            ran_red=self.ran_red[keep],
+            response_s=self.response_s[keep],
+            deceleration_mps2=self.deceleration_mps2[keep],
+            counts=self.counts,
+        )
 
 
 @dataclass(frozen=True)
@@ -63,7 +70,7 @@ class _Outcome:
 
 
 def yellow_approaches(scenes: Iterable[Scene]) -> Approaches:
-    """Every commanded driver on a controlled lane at an onset of yellow, slower than 10 s from its line.
+    """Every commanded driver on a controlled lane at an onset of yellow, less than 10 s from its line.
 
     Left out and counted: who crawls at the onset, and who neither stands nor crosses before its next green or its
     track's end. Scenes without road or signals have none.
@@ -72,71 +79,84 @@ def yellow_approaches(scenes: Iterable[Scene]) -> Approaches:
     counts: Counter[str] = Counter()
     for scene in scenes:
         rows += _of_scene(scene, counts)
-    columns = list(zip(*rows, strict=True)) if rows else [()] * (len(COLUMNS) + 2)
-    kinds = {"free": bool, "stopped": bool, "ran_red": bool, "decided": np.int64}
-    arrays = {
-        name: np.array(column, kinds.get(name, np.float64)) for name, column in zip(COLUMNS, columns[2:], strict=True)
-    }
-    return Approaches(tuple(map(str, columns[0])), tuple(map(str, columns[1])), **arrays, counts=dict(counts))
+    columns: list[tuple[object, ...]] = list(zip(*rows, strict=True)) if rows else [()] * 10
+    style, unit, tts, speed, free, decided, stopped, ran_red, response, deceleration = columns
+    return Approaches(
+        style=tuple(map(str, style)),
+        unit=tuple(map(str, unit)),
+        tts_s=np.array(tts, np.float64),
+        speed_mps=np.array(speed, np.float64),
+        free=np.array(free, bool),
+        decided=np.array(decided, np.int64),
+        stopped=np.array(stopped, bool),
+        ran_red=np.array(ran_red, bool),
+        response_s=np.array(response, np.float64),
+        deceleration_mps2=np.array(deceleration, np.float64),
+        counts=dict(counts),
+    )
 
 
-def _onsets(scene: Scene) -> Iterator[tuple[int, int, Lane]]:
-    """(light, frame, lane) of every change to yellow, for lanes that have a stop line."""
+def _onsets(scene: Scene) -> dict[int, list[tuple[int, Lane]]]:
+    """By frame, the (light, lane) that turn from green to yellow in it, for lanes that have a stop line."""
+    found: dict[int, list[tuple[int, Lane]]] = defaultdict(list)
     if scene.signals is None or scene.road is None:
-        return
+        return found
     lanes = {lane.lane_id: lane for lane in scene.road.lanes if lane.stop_line_m is not None}
     state = scene.signals.state
     changed = (state[:, 1:] == SignalState.YELLOW) & (state[:, :-1] == SignalState.GREEN)
     for light, frame in np.argwhere(changed).tolist():
-        for lane_id in scene.signals.lane_id[light]:
-            if lane_id in lanes:
-                yield light, frame + 1, lanes[lane_id]
+        found[frame + 1] += [(light, lanes[name]) for name in scene.signals.lane_id[light] if name in lanes]
+    return found
 
 
 def _of_scene(scene: Scene, counts: Counter[str]) -> Iterator[tuple[object, ...]]:
     tracks, speed = scene.tracks, scene.tracks.speed_mps
     half = np.nan_to_num(tracks.size_m[:, 0].astype(np.float64)) / 2
-    decided = np.where(tracks.flagged(TrackFlag.DECIDED_STOP), 1, 0)
-    known = tracks.flagged(TrackFlag.DECIDED_STOP) != tracks.flagged(TrackFlag.DECIDED_GO)
-    decided = np.where(known, decided, -1)
-    for light, frame, lane in _onsets(scene):
-        assert lane.stop_line_m is not None and scene.signals is not None
+    stop, go = tracks.flagged(TrackFlag.DECIDED_STOP), tracks.flagged(TrackFlag.DECIDED_GO)
+    decided = np.where(stop != go, np.where(stop, 1, 0), -1)
+    for frame, lights in _onsets(scene).items():
+        assert scene.signals is not None
         here = np.flatnonzero(tracks.valid[:, frame])
         if not len(here):
             continue
-        along, _, distance, _ = project(tracks.position_m[here, frame], lane.centre_line_m)
-        line_at = float(project(lane.stop_line_m.mean(axis=0)[None], lane.centre_line_m)[0][0])
-        ahead = line_at - along - half[here]
-        on = (distance <= LANE_REACH_M) & (ahead > 0)
-        shown = scene.signals.state[light]
-        green = np.flatnonzero(shown[frame:] == SignalState.GREEN)
-        end = frame + int(green[0]) if len(green) else len(shown)
-        for place in np.flatnonzero(on).tolist():
-            agent, metres = int(here[place]), float(ahead[place])
-            driver, pace = tracks.driver[agent], float(speed[agent, frame])
-            if driver is None or metres > MAX_TTS_S * max(pace, MIN_SPEED_MPS):
-                continue
-            counts["at the onset of yellow"] += 1
-            if pace < MIN_SPEED_MPS:
-                counts[f"slower than {MIN_SPEED_MPS:g} m/s at the onset"] += 1
-                continue
-            outcome = _outcome(tracks, speed[agent], agent, slice(frame, end), lane, line_at - half[agent], shown)
-            if outcome is None:
-                counts["neither stood nor crossed before the next green"] += 1
-                continue
-            nearer = on & (ahead < metres) & (ahead > metres - FREE_M)
-            yield (
-                driver.name,
-                scene.unit_id,
-                metres / pace,
-                pace,
-                not nearer.any(),
-                decided[agent],
-                outcome.stopped,
-                outcome.ran_red,
-                outcome.response_s,
-                outcome.deceleration_mps2,
-            )
+        ahead, away, line_at = _places(tracks.position_m[here, frame], half[here], [lane for _, lane in lights])
+        nearest = np.argmin(away, axis=0)
+        for row, (light, lane) in enumerate(lights):
+            on = (nearest == row) & (away[row] <= LANE_REACH_M) & (ahead[row] > 0)
+            shown = scene.signals.state[light]
+            green = np.flatnonzero(shown[frame:] == SignalState.GREEN)
+            frames = slice(frame, frame + int(green[0]) if len(green) else len(shown))
+            for place in np.flatnonzero(on).tolist():
+                agent, metres = int(here[place]), float(ahead[row, place])
+                driver, pace = tracks.driver[agent], float(speed[agent, frame])
+                if driver is None or metres > MAX_TTS_S * max(pace, MIN_SPEED_MPS):
+                    continue
+                counts["at the onset of yellow"] += 1
+                if pace < MIN_SPEED_MPS:
+                    counts[f"slower than {MIN_SPEED_MPS:g} m/s at the onset"] += 1
+                    continue
+                centre_at = line_at[row] - half[agent]
+                found = _outcome(tracks, speed[agent], agent, frames, lane, centre_at, shown)
+                if found is None:
+                    counts["neither stood nor crossed before the next green"] += 1
+                    continue
+                free = not (on & (ahead[row] < metres) & (ahead[row] > metres - FREE_M)).any()
+                start = (driver.name, scene.unit_id, metres / pace, pace, free, decided[agent])
+                yield (*start, found.stopped, found.ran_red, found.response_s, found.deceleration_mps2)
+
+
+def _places(
+    points_m: Float[np.ndarray, "agent 2"], half_m: Float64[np.ndarray, " agent"], lanes: Sequence[Lane]
+) -> tuple[Float64[np.ndarray, "lane agent"], Float64[np.ndarray, "lane agent"], list[float]]:
+    """From each front to each lane's stop line, from each centre to the lane, and where on the lane the line is."""
+    ahead, away, line_at = [], [], []
+    for lane in lanes:
+        assert lane.stop_line_m is not None
+        along, _, distance, _ = project(points_m, lane.centre_line_m)
+        line_at.append(float(project(lane.stop_line_m.mean(axis=0)[None], lane.centre_line_m)[0][0]))
+        ahead.append(line_at[-1] - along - half_m)
+        away.append(distance)
+    return np.array(ahead), np.array(away), line_at
 
 
 def _outcome(

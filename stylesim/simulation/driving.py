@@ -14,6 +14,7 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Float
 
+from stylesim.simulation.stopping import latest_response_s
 from stylesim.style import DriverStyle
 
 # Within one driver: sqrt(0.40^2 - 0.30^2) and sqrt(0.276^2 - 0.08^2), see above.
@@ -21,6 +22,8 @@ RESPONSE_SIGMA = 0.26
 DECELERATION_SIGMA = 0.264
 SHORTEST_RESPONSE_S = 0.4  # chosen, because 0.7 s is the 15 % quantile and no observed stop was quicker than about this
 HARDEST_BRAKING_MPS2 = 7.5  # TRID 801675: 821 stops at yellow used 1.51 to 7.47 m/s2
+# REFERENCE section 5: wet road k 2.44 1/s, m 3.0 s (50 % at 3.0 s, 90 % at 3.9 s), against 2.14 and 2.88 on a dry one.
+WET_LATER_S, WET_STEEPER = 3.0 - 2.88, 2.44 / 2.14
 STANDING_MPS = 0.05  # who is slower stands and stops for sure
 LARGEST_Z = 2.5  # draws are clipped there, because a single driver must not respond after 5 s
 
@@ -32,6 +35,7 @@ class YellowDecision:
     stop: bool
     response_s: float  # from the onset of yellow until the driver acts; 0 where it goes
     deceleration_mps2: float  # with which it then wishes to brake; NaN where it goes
+    impossible: bool = False  # it would have stopped, but nobody could
 
 
 def stop_probability(
@@ -64,25 +68,28 @@ def wished_deceleration(style: DriverStyle, rng: np.random.Generator) -> float:
 
 
 def decide_at_yellow(
-    style: DriverStyle, *, speed_mps: float, distance_m: float, rng: np.random.Generator
+    style: DriverStyle, *, speed_mps: float, distance_m: float, rng: np.random.Generator, wet: bool = False
 ) -> YellowDecision:
     """Stop or go, drawn once at the onset of yellow from the time to the stop line at the present speed.
 
     Three draws are taken from `rng` whatever comes out. A driver who stops acts after its brake response; where
-    that leaves more than 7.5 m/s2 to brake, it responds as early as it takes (people who stop close to the line
-    do respond earlier), down to 0.4 s; where even that is too late nobody could stop, and it goes [ours].
+    that leaves more than 7.5 m/s2 to brake (with what building up and easing off take, `stopping`), it responds as
+    early as it takes (people who stop close to the line do respond earlier), down to 0.4 s; where even that is too
+    late nobody could stop, and it goes [ours]. On a wet road the curve lies later and is steeper; braking is the same.
     """
     standing = speed_mps < STANDING_MPS
     time_to_line_s = math.inf if standing else distance_m / speed_mps
-    chance = stop_probability(time_to_line_s, midpoint_s=style.yellow_midpoint_s, slope_per_s=style.yellow_slope_per_s)
+    midpoint = style.yellow_midpoint_s + (WET_LATER_S if wet else 0.0)
+    slope = style.yellow_slope_per_s * (WET_STEEPER if wet else 1.0)
+    chance = stop_probability(time_to_line_s, midpoint_s=midpoint, slope_per_s=slope)
     wants_to_stop = bool(rng.random() < chance)
     response = brake_response(style, rng)
     wish = wished_deceleration(style, rng)
     if wants_to_stop and not standing:
-        latest = (distance_m - speed_mps**2 / (2.0 * HARDEST_BRAKING_MPS2)) / speed_mps
+        latest = latest_response_s(speed_mps=speed_mps, distance_m=distance_m, deceleration_mps2=HARDEST_BRAKING_MPS2)
         response = min(response, latest)
     if not wants_to_stop or response < SHORTEST_RESPONSE_S:
-        return YellowDecision(stop=False, response_s=0.0, deceleration_mps2=math.nan)
+        return YellowDecision(stop=False, response_s=0.0, deceleration_mps2=math.nan, impossible=wants_to_stop)
     return YellowDecision(stop=True, response_s=response, deceleration_mps2=wish)
 
 

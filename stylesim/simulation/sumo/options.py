@@ -14,6 +14,7 @@ from stylesim.specs import Spec, parse
 PARAMETERS = ("speed_limit_mps", "truck_share")
 DEMAND_PARAMETERS = ("demand_vph",)
 SIGNAL_PARAMETERS = ("cycle_s", "first_green_share", "yellow_s", "all_red_s")
+OPTIONAL_PARAMETERS = ("wet_road",)  # 1: drivers decide at a yellow as on a wet road
 
 
 class NetworkFiles(Spec):
@@ -116,8 +117,8 @@ def sumo_options_of(scenario: Scenario) -> SumoOptions:
     wanted = PARAMETERS + (DEMAND_PARAMETERS if options.has_demand else ())
     wanted += SIGNAL_PARAMETERS if options.signals else ()
     for name in scenario.parameters:
-        if name not in wanted:
-            raise unknown("parameter", name, wanted, where=where)
+        if name not in wanted + OPTIONAL_PARAMETERS:
+            raise unknown("parameter", name, wanted + OPTIONAL_PARAMETERS, where=where)
     for name in wanted:
         if name not in scenario.parameters:
             raise InputError(f"{where}: parameter {name!r} is missing; this scenario needs {', '.join(wanted)}")

@@ -71,6 +71,9 @@ def _tracks(
     keep = np.flatnonzero(np.bincount(bodies.driver[logged], minlength=len(log.driver_ids)))
     tracks = _dense(bodies, files, log.driver_ids, flags, logged=logged, keep=keep, warm=warm, frames=frames)
     counts = _counts(tracks, log, range(warm, warm + frames))
+    answered = [event for event in decisions if warm <= event.step < warm + frames]
+    counts["stop_impossible"] = sum(event.impossible for event in answered)
+    counts["gave_up_at_red"] = sum(event.gave_up for event in answered)
     counts["settling_steps_dropped"] = int((in_time & ~logged).sum())
     return tracks, counts | _overlap_counts(bodies, files, log.driver_ids, logged)
 
