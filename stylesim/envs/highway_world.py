@@ -173,9 +173,9 @@ class HighwayWorld:
 class _CrewWithEgo(Crew):
     """A crew that gives every car a driver but the egos."""
 
-    def hire(self, vehicle: StyledVehicle) -> None:
+    def hire(self, vehicle: StyledVehicle, *, limit_mps: float | None = None) -> None:
         if not isinstance(vehicle, EgoVehicle):
-            super().hire(vehicle)
+            super().hire(vehicle, limit_mps=limit_mps)
 
 
 def _ahead_m(car: StyledVehicle) -> float:

@@ -18,6 +18,13 @@ from stylesim.simulation.plan import PLAIN, EpisodePlan
 from stylesim.tracks import TrackFlag, Tracks
 
 SOURCE = "highway_env"
+AT_LIGHTS = (
+    TrackFlag.DECIDED_STOP,
+    TrackFlag.DECIDED_GO,
+    TrackFlag.STOPPED_AT_LINE,
+    TrackFlag.CROSSED_ON_YELLOW,
+    TrackFlag.RAN_RED,
+)
 
 
 class HighwayBackend:
@@ -44,14 +51,13 @@ class HighwayBackend:
         for _ in range(round(scenario.warm_up_s * options.simulation_hz)):
             traffic.advance()
         early = len(traffic.removed)
-        for vehicle in traffic.road.vehicles:
-            vehicle.emergency_braked = False  # what happens in the log counts
+        traffic.start_log()
         for frame in range(n_frames):
-            log.add(traffic.logged())
+            log.add(traffic.frame())
             crew.after_frame(frame / LOG_HZ, traffic.road.vehicles)
             for _ in range(options.simulation_hz // LOG_HZ):
                 traffic.advance()
-        tracks = log.tracks(set(traffic.removed))
+        tracks = log.tracks(set(traffic.removed), traffic.flags())
         scene_id = f"{scenario.name}-{seed}-{episode:05d}"
         scene = Scene(
             scene_id=scene_id,
@@ -60,6 +66,7 @@ class HighwayBackend:
             scenario=scenario.name,
             tracks=tracks,
             road=road_of(traffic.road.network, junction_nodes=traffic.junction_nodes),
+            signals=traffic.signals(),
             counts=_counts(tracks, traffic, log, removed_before_log=early),
             parameters=drawn,
         )
@@ -77,6 +84,7 @@ def _counts(tracks: Tracks, traffic: Traffic, log: TrackLog, *, removed_before_l
         "collisions": sum(bool(pair & logged) for pair in traffic.road.collided_pairs),
         "collided": int(np.count_nonzero(tracks.flagged(TrackFlag.COLLIDED))),
         "emergency_braked": int(np.count_nonzero(tracks.flagged(TrackFlag.EMERGENCY_BRAKED))),
+        **({} if traffic.signals() is None else {flag.name.lower(): int(tracks.flagged(flag).sum()) for flag in AT_LIGHTS}),
         "removed_crashed": reasons["crashed"],
         "removed_off_road": reasons["off_road"],
         "removed_before_log": removed_before_log,

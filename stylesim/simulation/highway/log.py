@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from dataclasses import replace
+from types import MappingProxyType
 
 import numpy as np
 
@@ -34,7 +36,7 @@ class TrackLog:
             self._rows.append((number, self._frame, x, -y, vx, -vy, -vehicle.heading))
         self._frame += 1
 
-    def tracks(self, removed: set[str]) -> Tracks:
+    def tracks(self, removed: set[str], at_lights: Mapping[str, TrackFlag] = MappingProxyType({})) -> Tracks:
         """Everything logged, by id, flagged; a collision's push moves a car in one step, which is implausible."""
         order = sorted(self._number)
         place = {self._number[driver_id]: i for i, driver_id in enumerate(order)}
@@ -53,7 +55,7 @@ class TrackLog:
             valid=valid,
             dt_s=self._dt_s,
             driver=tuple(car.style for car in cars),
-            flags=np.array([_flags(car, removed) for car in cars], np.int32),
+            flags=np.array([_flags(car, removed) | int(at_lights.get(car.driver_id, 0)) for car in cars], np.int32),
         )
         assert tracks.flags is not None
         contradicted = np.where(implausible(tracks).agents, np.int32(TrackFlag.IMPLAUSIBLE), np.int32(0))

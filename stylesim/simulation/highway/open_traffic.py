@@ -3,23 +3,31 @@
 from __future__ import annotations
 
 from collections import deque
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 
+from stylesim.signals import Signals
+from stylesim.simulation.highway.graph import LaneIndex
 from stylesim.simulation.highway.lane_choice import lane_needs, must_change
+from stylesim.simulation.highway.lanes import lane_id
+from stylesim.simulation.highway.lights import Lights
 from stylesim.simulation.highway.road import StyledRoad
 from stylesim.simulation.highway.sites import Edge, Site, Trip
 from stylesim.simulation.highway.spec import HighwayOptions
 from stylesim.simulation.highway.traffic import Crew, Traffic
 from stylesim.simulation.highway.vehicle import StyledVehicle
+from stylesim.tracks import TrackFlag
 
 SETTLING_S = 3.0  # after insertion, not logged: cars find their speed and gap in that time (as in the other simulator)
 LAST_ENTRY_S = 27.0  # nobody enters later than that before the end, so that everybody is seen for 20 s and more
 SHORTEST_HEADWAY_S = 1.0  # between two arrivals in one lane; chosen: bold drivers follow so closely
 ENTRY_HEADWAY_S = 1.5  # who wants more than that behind its leader opens the gap after it has entered
 ENTRY_FASTER_MPS = 3.0  # at most that much faster than the leader at the entry
+LEAD_S = 4.0  # single cars are placed that long before the onset of yellow, so that they are logged for 1 s before it
+DILEMMA_S = (1.0, 6.0)  # REFERENCE section 5: who is nearer goes, who is farther stops
 LEAVES_M = 8.0  # before the end of its last lane a car has arrived
 MISSED_M = 5.0  # who is that close to the fork and not in its lane goes on where its lane leads
 
@@ -47,8 +55,31 @@ class OpenTraffic(Traffic):
         self._step = 0
         self._entered: dict[str, int] = {}  # driver -> step of its insertion; who stood there at the start is not in it
         self._waiting: dict[Edge, deque[StyledVehicle]] = {edge: deque() for edge in site.arrivals_per_s}
-        self._due = self._arrivals(crew.stream("demand"), time_s - LAST_ENTRY_S)
-        self._fill(crew.stream("placement"))
+        self.lights = self._lights()
+        self._due: list[tuple[float, Edge, int]] = []
+        self._placed: list[tuple[float, LaneIndex, float]] = []
+        if self.lights is not None and options.arrivals == "dilemma":
+            self._placed = self._dilemmas(crew.stream("demand"), self.lights, time_s - LAST_ENTRY_S)
+        else:
+            self._due = self._arrivals(crew.stream("demand"), time_s - LAST_ENTRY_S)
+            self._fill(crew.stream("placement"))
+
+    def _lights(self) -> Lights | None:
+        if self._site.light is None:
+            return None
+        lanes = [index for index in self.road.graph.after if self._enters_junction(index)]
+        offset = float(self._crew.stream("signal").uniform(0.0, self._site.light.cycle_s))
+        return Lights(lanes, replace(self._site.light, offset_s=offset), key=self._crew.key)
+
+    def _enters_junction(self, index: LaneIndex) -> bool:
+        inner = self.junction_nodes
+        return index[1].startswith(inner) and not index[0].startswith(inner)
+
+    def _dilemmas(self, rng: np.random.Generator, lights: Lights, until_s: float) -> list[tuple[float, LaneIndex, float]]:
+        """(time of insertion, lane, time to the line at the onset of yellow) of single cars, latest first."""
+        onsets = [onset - LEAD_S for onset in lights.programme.onsets_of_yellow(until_s) if onset >= LEAD_S]
+        placed = [(time, index, float(rng.uniform(*DILEMMA_S))) for time in onsets for index in lights.lanes]
+        return sorted(placed, reverse=True)
 
     def _arrivals(self, rng: np.random.Generator, until_s: float) -> list[tuple[float, Edge, int]]:
         """(time, entry, way) of every arrival, latest first: random headways with a shortest one."""
@@ -100,7 +131,7 @@ class OpenTraffic(Traffic):
             place_m, index = place_m - length, onward[0]
         vehicle = StyledVehicle.make_on_lane(self.road, index, place_m, 0.0)
         self._brief(vehicle, way)
-        self._crew.hire(vehicle)
+        self._hire(vehicle)
         vehicle.speed = 0.9 * vehicle.wished_speed_mps
         self.road.vehicles.append(vehicle)
 
@@ -112,21 +143,67 @@ class OpenTraffic(Traffic):
         settling = round(SETTLING_S / self._dt)
         return [v for v in self.road.vehicles if self._step - self._entered.get(v.driver_id, -settling) >= settling]
 
+    def start_log(self) -> None:
+        """From now on what happens counts."""
+        super().start_log()
+        if self.lights is not None:
+            self.lights.flags.clear()
+
+    def frame(self) -> list[StyledVehicle]:
+        """The cars of the next logged frame, and the lights."""
+        if self.lights is not None:
+            self.lights.note_frame(self._step * self._dt)
+        return super().frame()
+
+    def flags(self) -> Mapping[str, TrackFlag]:
+        """What happened at the lights."""
+        return {} if self.lights is None else self.lights.flags
+
+    def signals(self) -> Signals | None:
+        """What the lights showed, one for each lane."""
+        return None if self.lights is None else self.lights.signals(map(lane_id, self.lights.lanes))
+
     def advance(self) -> None:
         """One simulation step, then cars leave and enter."""
+        if self.lights is not None:
+            self.lights.before_step(self._step * self._dt, self.road)
         super().advance()
         self._step += 1
         self._leave()
+        while self._placed and self._placed[-1][0] <= self._step * self._dt:
+            self._place(*self._placed.pop()[1:])
         while self._due and self._due[-1][0] <= self._step * self._dt:
             _, edge, way = self._due.pop()
             vehicle = StyledVehicle.make_on_lane(self.road, (*edge, 0), StyledVehicle.LENGTH, 0.0)
             self._brief(vehicle, way)
-            self._crew.hire(vehicle)
+            self._hire(vehicle)
             self._waiting[edge].append(vehicle)
         for edge, queue in self._waiting.items():
             while queue and self._enters(edge, queue[0]):
                 queue.popleft()
         self.counts["not_inserted"] = sum(len(queue) for queue in self._waiting.values())
+
+    def _place(self, index: LaneIndex, time_to_line_s: float) -> None:
+        """One car that will be that far from the line at the coming onset of yellow, at the speed it wishes."""
+        vehicle = StyledVehicle.make_on_lane(self.road, index, StyledVehicle.LENGTH, 0.0)
+        self._brief(vehicle, self._draw_way(index[:2], self._crew.stream("ways")))
+        self._hire(vehicle)
+        distance = vehicle.wished_speed_mps * (time_to_line_s + LEAD_S) + vehicle.LENGTH / 2
+        self._put(vehicle, index, self.road.graph.length_m[index] - distance, vehicle.wished_speed_mps)
+
+    def _put(self, vehicle: StyledVehicle, index: LaneIndex, along_m: float, speed_mps: float) -> None:
+        lane = self.road.network.get_lane(index)
+        vehicle.position = np.array(lane.position(along_m, 0.0), np.float64)
+        vehicle.heading, vehicle.speed = float(lane.heading_at(along_m)), speed_mps
+        vehicle.lane_index, vehicle.lane = index, lane
+        vehicle.aim_at(index)
+        self.road.vehicles.append(vehicle)
+        self._entered[vehicle.driver_id] = self._step
+
+    def _hire(self, vehicle: StyledVehicle) -> None:
+        """A driver for the car; what it wishes belongs to the fastest road of its way."""
+        limits = [self.road.network.get_lane((*leg[:2], 0)).speed_limit for leg in vehicle.route]
+        self._crew.hire(vehicle, limit_mps=float(max(limits)))
 
     def _leave(self) -> None:
         staying = []
@@ -178,11 +255,5 @@ class OpenTraffic(Traffic):
                 best, fastest = index, speed
         if best is None:
             return False
-        start = self.road.network.get_lane(best)
-        vehicle.position = np.array(start.position(vehicle.LENGTH, 0.0), np.float64)
-        vehicle.heading, vehicle.speed = float(start.heading_at(vehicle.LENGTH)), fastest
-        vehicle.lane_index, vehicle.lane = best, start
-        vehicle.target_lane_index = vehicle._steered_lane = best
-        self.road.vehicles.append(vehicle)
-        self._entered[vehicle.driver_id] = self._step
+        self._put(vehicle, best, vehicle.LENGTH, fastest)
         return True

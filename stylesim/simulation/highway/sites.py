@@ -12,6 +12,8 @@ from dataclasses import dataclass
 from highway_env.road.lane import AbstractLane, LineType, SineLane, StraightLane
 from highway_env.road.road import RoadNetwork
 
+from stylesim.simulation.highway.lights import Programme
+
 LANE_M = StraightLane.DEFAULT_WIDTH
 RAMP_LIMIT_MPS = 80 / 3.6  # usual on ramps between motorways and main roads
 ASIDE_M = 6.5  # of a ramp from the lane that it joins; highway-env's merge-v0 has the same
@@ -40,6 +42,7 @@ class Site:
     arrivals_per_s: Mapping[Edge, float]
     filled_m: Mapping[Edge, float]
     junction_nodes: str = ""
+    light: Programme | None = None  # at the end of the lanes that lead into the junction
 
 
 def lanes_beside(
@@ -122,4 +125,25 @@ def exit_site(drawn: Mapping[str, float]) -> Site:
     )
 
 
-SITES: dict[str, Callable[[Mapping[str, float]], Site]] = {"merge": merge_site, "exit": exit_site}
+def yellow_light_site(drawn: Mapping[str, float]) -> Site:
+    """400 m of two lanes to a signal, 20 m of crossing, 150 m beyond."""
+    limit, line, across, out = drawn["speed_limit_mps"], 400.0, 420.0, 570.0
+    network = RoadNetwork()
+    through = (("west", "iw"), ("iw", "ie"), ("ie", "east"))
+    for edge, span in zip(through, ((0.0, line), (line, across), (across, out)), strict=True):
+        lanes_beside(network, edge, span, lanes=2, limit_mps=limit)
+    return Site(
+        network,
+        (Trip(through),),
+        arrivals_per_s={through[0]: drawn["demand_vph"] / 3600.0},
+        filled_m={through[0]: 250.0},
+        junction_nodes="i",
+        light=Programme(drawn["green_s"], drawn["yellow_s"], drawn["red_s"]),
+    )
+
+
+SITES: dict[str, Callable[[Mapping[str, float]], Site]] = {
+    "merge": merge_site,
+    "exit": exit_site,
+    "yellow_light": yellow_light_site,
+}

@@ -21,9 +21,9 @@ PARAMETERS: dict[str, tuple[str, ...]] = {
     "exit": ("density_per_km_lane", "exit_share", "lanes", "speed_limit_mps"),
     "roundabout": ("demand_vph", "speed_limit_mps"),
     "two_way": ("density_per_km_lane", "speed_limit_mps"),
-    "yellow_light": ("all_red_s", "cars_per_green", "green_s", "red_s", "speed_limit_mps", "yellow_s"),
+    "yellow_light": ("demand_vph", "green_s", "red_s", "speed_limit_mps", "yellow_s"),
 }
-MAY_BE_ZERO = ("spawn_per_s", "ramp_share", "exit_share", "all_red_s")
+MAY_BE_ZERO = ("spawn_per_s", "ramp_share", "exit_share")
 
 
 class HighwayOptions(Spec):
@@ -34,7 +34,6 @@ class HighwayOptions(Spec):
     vehicles: int = Field(default=30, ge=1, le=200)  # of the highway; elsewhere cars come and go
     crashed_stay_s: float = Field(default=5.0, ge=0)  # crashed cars stand that long, then they are removed
     arrivals: Literal["stream", "dilemma"] = "stream"  # at the light: as they come, or placed about the onset of yellow
-    wet: bool = False  # drivers at the light decide as on a wet road
 
 
 def options_of(scenario: Scenario) -> HighwayOptions:

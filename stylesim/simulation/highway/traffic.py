@@ -10,10 +10,12 @@ from highway_env.road.road import RoadNetwork
 
 from stylesim.population import Population
 from stylesim.randomness import stream
+from stylesim.signals import Signals
 from stylesim.simulation.highway.road import StyledRoad
 from stylesim.simulation.highway.spec import HighwayOptions
 from stylesim.simulation.highway.vehicle import TOP_SPEED_MPS, StyledVehicle
 from stylesim.simulation.plan import Twin, salted
+from stylesim.tracks import TrackFlag
 
 RUN_UP_M = 100.0  # road behind the last car at the start
 
@@ -28,6 +30,11 @@ class Crew:
         self._twin = twin
         self._differs = twin is not None and twin.at_s is None  # the twin's driver is another one by now
 
+    @property
+    def key(self) -> tuple[int, int]:
+        """(seed, episode)."""
+        return self._key
+
     def stream(self, purpose: str) -> np.random.Generator:
         """The episode's own random stream for that purpose."""
         return stream(*self._key, "", purpose)
@@ -38,13 +45,13 @@ class Crew:
         other = self._differs and twin is not None and twin.new_noise and twin.driver == driver_id
         return stream(*self._key, driver_id, salted(purpose, new_noise=other))
 
-    def hire(self, vehicle: StyledVehicle) -> None:
-        """Give the car its driver, unless it has one."""
+    def hire(self, vehicle: StyledVehicle, *, limit_mps: float | None = None) -> None:
+        """Give the car its driver, unless it has one; the limit of its way, where that is not its lane's."""
         if vehicle.style is not None:
             return
         driver_id = f"car-{self._hired:04d}"
         self._hired += 1
-        limit = vehicle.lane.speed_limit
+        limit = limit_mps or vehicle.lane.speed_limit
         style = self._population.draw(stream(*self._key, driver_id, "style"), backend="highway", limit_mps=limit)
         if self._twin is not None and self._differs and self._twin.driver == driver_id:
             style = self._twin.style
@@ -84,6 +91,23 @@ class Traffic:
         """The cars that the log shows now; newcomers are left out while they settle."""
         vehicles: list[StyledVehicle] = self.road.vehicles
         return vehicles
+
+    def start_log(self) -> None:
+        """From now on what happens counts."""
+        for vehicle in self.road.vehicles:
+            vehicle.emergency_braked = False
+
+    def frame(self) -> list[StyledVehicle]:
+        """The cars of the next logged frame."""
+        return self.logged()
+
+    def flags(self) -> Mapping[str, TrackFlag]:
+        """What happened at lights, by driver."""
+        return {}
+
+    def signals(self) -> Signals | None:
+        """What the lights showed in the logged frames; None without lights."""
+        return None
 
     def advance(self) -> None:
         """One simulation step; newcomers get their drivers, wrecks and cars off the road are taken away."""

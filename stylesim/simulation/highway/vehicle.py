@@ -10,7 +10,7 @@ import numpy as np
 from highway_env.vehicle.behavior import IDMVehicle
 from highway_env.vehicle.kinematics import Vehicle
 
-from stylesim.simulation.highway.following import behind_leader, free_road
+from stylesim.simulation.highway.following import LEAST_GAP_M, behind_leader, free_road
 from stylesim.simulation.highway.lane_choice import Needs, choose_lane, must_change
 from stylesim.simulation.highway.noise import Wander
 from stylesim.simulation.highway.path import braking_to_yield_mps2, curve_speed_mps
@@ -87,6 +87,10 @@ class StyledVehicle(IDMVehicle):  # type: ignore[misc]
         limit = self.style.desired_speed_factor * self.lane.speed_limit
         return min(limit, curve_speed_mps(self, self.style.comfortable_deceleration_mps2)) if self.route else limit
 
+    def aim_at(self, index: tuple[str, str, int]) -> None:
+        """Follow that lane from now on, without changing onto it."""
+        self.target_lane_index = self._steered_lane = index
+
     def act(self, action: Any = None) -> None:
         """Lane, wheel and pedal of the coming step, as the style wants them."""
         if self.crashed:
@@ -101,9 +105,12 @@ class StyledVehicle(IDMVehicle):  # type: ignore[misc]
         if self.target_lane_index != self.lane_index:
             onto = self.judged(self, *self.road.ahead(self, self.target_lane_index))
             acceleration = min(acceleration, onto)
-        obstacle = min(self._lane_end_m(), self.stop_ahead_m)
-        if obstacle < math.inf:
-            acceleration = min(acceleration, self._before_standing(obstacle))
+        end = self._lane_end_m()
+        if end < math.inf:
+            acceleration = min(acceleration, self._before_standing(end))
+        if self.stop_ahead_m < math.inf:  # with what it takes, evenly
+            needed = self.speed**2 / (2.0 * max(self.stop_ahead_m, LEAST_GAP_M))
+            acceleration = min(acceleration, -min(needed, TYRES_MPS2))
         self.action = {"steering": self.steering_control(self.target_lane_index), "acceleration": acceleration}
 
     def judged(self, car: Any, leader: Any, gap_m: float) -> float:
