@@ -19,11 +19,11 @@ from stylesim.tracks import TrackFlag, Tracks
 
 SOURCE = "highway_env"
 AT_LIGHTS = (
-    TrackFlag.DECIDED_STOP,
-    TrackFlag.DECIDED_GO,
-    TrackFlag.STOPPED_AT_LINE,
-    TrackFlag.CROSSED_ON_YELLOW,
-    TrackFlag.RAN_RED,
+    ("decided_stop", TrackFlag.DECIDED_STOP),
+    ("decided_go", TrackFlag.DECIDED_GO),
+    ("stopped_at_line", TrackFlag.STOPPED_AT_LINE),
+    ("crossed_on_yellow", TrackFlag.CROSSED_ON_YELLOW),
+    ("ran_red", TrackFlag.RAN_RED),
 )
 
 
@@ -84,7 +84,7 @@ def _counts(tracks: Tracks, traffic: Traffic, log: TrackLog, *, removed_before_l
         "collisions": sum(bool(pair & logged) for pair in traffic.road.collided_pairs),
         "collided": int(np.count_nonzero(tracks.flagged(TrackFlag.COLLIDED))),
         "emergency_braked": int(np.count_nonzero(tracks.flagged(TrackFlag.EMERGENCY_BRAKED))),
-        **({} if traffic.signals() is None else {flag.name.lower(): int(tracks.flagged(flag).sum()) for flag in AT_LIGHTS}),
+        **({} if traffic.signals() is None else {n: int(tracks.flagged(f).sum()) for n, f in AT_LIGHTS}),
         "removed_crashed": reasons["crashed"],
         "removed_off_road": reasons["off_road"],
         "removed_before_log": removed_before_log,

@@ -17,6 +17,7 @@ MOBIL_GAIN_MPS2 = 0.2  # highway-env's threshold, an average driver's
 MOBIL_SAFE_MPS2 = 2.0  # highway-env's imposed braking, an average driver's
 NEUTRAL_GAP_S = 4.5  # gap acceptance of the neutral driver in agents/styles.yaml
 EVERY_S = 1.0  # highway-env's: lane changes are thought of once a second
+KEEP_RIGHT_MPS2 = 0.3  # bias of MOBIL's European rule (Kesting, Treiber, Helbing 2007 [recalled])
 LEAST_MPS = 1.0  # highway-env's: who is slower does not change lanes, unless it must
 ACCEPTED_SHARE = 0.2  # chosen: accepted lag is 0.9 s for the neutral gap of 4.5 s; observed median 0.8-1.5 s
 EARLIEST_M, LATEST_M = 1000.0, 300.0  # exits are announced 1000 m ahead; chosen: the boldest act in the last 300 m
@@ -136,7 +137,9 @@ def _accepts(car: Any, index: LaneIndex, *, must: bool, hurry: float) -> bool:
     gain = own_after - car.judged(car, *before)
     if style.politeness > 0:
         gain += style.politeness * _others_gain(car, (front, front_gap), (rear, rear_gap), rear_after, before)
-    return bool(gain >= MOBIL_GAIN_MPS2 / max(style.lane_change_eagerness, 1e-3))
+    if index[2] > car.lane_index[2]:  # to the right one goes because it is free, not for speed
+        return bool(gain >= MOBIL_GAIN_MPS2 - KEEP_RIGHT_MPS2)
+    return bool(gain >= MOBIL_GAIN_MPS2 / max(style.lane_change_eagerness, 1e-3) + KEEP_RIGHT_MPS2)
 
 
 def _needed(car: Any, leader: Any, gap_m: float) -> float:

@@ -8,24 +8,28 @@ goes drives on, at red for as long as its style runs red, and then stops if it s
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 from jaxtyping import Int8
 
-from stylesim.randomness import stream
 from stylesim.signals import Signals, SignalState
 from stylesim.simulation.driving import HARDEST_BRAKING_MPS2, YellowDecision, decide_at_yellow
 from stylesim.simulation.highway.graph import LaneIndex
+from stylesim.simulation.highway.pedal import JERK_MPS3
 from stylesim.tracks import TrackFlag
 
 HORIZON_M = 250.0  # who is farther away at the onset of yellow does not decide; as in the other simulator
-STANDS_BEFORE_M = 2.0  # chosen: how far before the line the front bumper comes to rest
+STANDS_BEFORE_M = 1.5  # chosen: how far before the line the front bumper comes to rest
 AT_LINE_M = 5.0  # the first in a queue stands this close
 STANDING_MPS = 0.3
+LIMIT_MPS2 = 8.0  # a stop that needs more is not made
+EARLY_S = 0.1  # a step until the pedal moves
 RED_GRACE_S = 0.1  # the front over the line that long after the onset of red, or later, has run it
+
+Streams = Callable[[str, str], np.random.Generator]  # of a driver, for a purpose
 
 
 @dataclass(frozen=True)
@@ -57,18 +61,19 @@ class Programme:
 
 @dataclass
 class _Answer:
-    """What one driver does about the present yellow and red; `tried` once it has begun to brake."""
+    """What one driver does about the present yellow and red."""
 
-    decision: YellowDecision | None
+    decision: YellowDecision
     onset_s: float
+    given_up: bool = False
 
 
 class Lights:
     """The lights of one line: shows the programme, and tells every car where it must stop."""
 
-    def __init__(self, lanes: Iterable[LaneIndex], programme: Programme, *, key: tuple[int, int]) -> None:
+    def __init__(self, lanes: Iterable[LaneIndex], programme: Programme, streams: Streams) -> None:
         self.lanes = tuple(lanes)
-        self.programme, self._key = programme, key
+        self.programme, self._streams = programme, streams
         self._answers: dict[str, _Answer] = {}
         self._times_decided: dict[str, int] = {}
         self._before: dict[str, float] = {}  # distance to the line in the step before
@@ -76,6 +81,7 @@ class Lights:
         self.shown = programme.state(0.0)
         self.log: list[int] = []
         self.flags: dict[str, TrackFlag] = {}
+        self.not_executed = 0  # stops that would have needed too much braking
 
     def before_step(self, time_s: float, road: Any) -> None:
         """Show what is due at this time, let drivers decide, and set everybody's `stop_ahead_m`."""
@@ -89,10 +95,11 @@ class Lights:
         for car in road.vehicles:
             index = car.target_lane_index
             distance = road.graph.length_m[index] - road.place(car, index)[0] - car.LENGTH / 2
-            if index not in self.lanes:  # a car looks to its next lane some time before its front is over the line
-                before = self._before.pop(car.driver_id, -1.0)
-                distance = before - car.speed * 0.0 if before > 0 else -1.0
+            if index not in self.lanes:  # over the line, or on its way out
+                distance = -1.0
             self._note(car, distance, time_s)
+            if car.style is None:  # somebody else drives it
+                continue
             if onset and 0 < distance <= HORIZON_M:
                 self._decide(car, distance, time_s)
             car.stop_ahead_m = self._stop_ahead(car, distance, time_s) if distance > 0 else math.inf
@@ -100,7 +107,7 @@ class Lights:
     def _decide(self, car: Any, distance_m: float, time_s: float) -> None:
         number = self._times_decided.get(car.driver_id, 0)
         self._times_decided[car.driver_id] = number + 1
-        rng = stream(*self._key, car.driver_id, f"yellow {number}")
+        rng = self._streams(car.driver_id, f"yellow {number}")
         decision = decide_at_yellow(car.style, speed_mps=car.speed, distance_m=distance_m, rng=rng)
         self._answers[car.driver_id] = _Answer(decision, time_s)
         self._flag(car, TrackFlag.DECIDED_STOP if decision.stop else TrackFlag.DECIDED_GO)
@@ -111,15 +118,31 @@ class Lights:
             return math.inf
         answer = self._answers.get(car.driver_id)
         place = max(distance_m - STANDS_BEFORE_M, 0.0)
-        if answer is None or answer.decision is None:  # came too late to decide: obeys where it can
+        if answer is None:  # came too late to decide: obeys where it can
             able = _needed_mps2(car, distance_m) <= HARDEST_BRAKING_MPS2
             return place if able or car.stop_ahead_m < math.inf else math.inf
         if answer.decision.stop:
-            return place if time_s - answer.onset_s >= answer.decision.response_s else math.inf
+            return self._stops(car, answer, distance_m, time_s)
         if self.shown == SignalState.YELLOW or time_s - self._red_since_s <= car.style.red_running_s:
             return math.inf
         able = _needed_mps2(car, distance_m) <= car.style.comfortable_deceleration_mps2
         return place if able or car.stop_ahead_m < math.inf else math.inf
+
+    def _stops(self, car: Any, answer: _Answer, distance_m: float, time_s: float) -> float:
+        """The answer of who decided to stop: after its response, counted to the middle of the brake's build-up."""
+        place = max(distance_m - STANDS_BEFORE_M, 0.0)
+        if car.stop_ahead_m < math.inf:
+            return place
+        needed = _needed_mps2(car, place)
+        if answer.given_up or time_s - answer.onset_s < answer.decision.response_s - EARLY_S - needed / (
+            2.0 * JERK_MPS3
+        ):
+            return math.inf
+        if needed > LIMIT_MPS2:
+            answer.given_up = True
+            self.not_executed += 1
+            return math.inf
+        return place
 
     def _note(self, car: Any, distance_m: float, time_s: float) -> None:
         """Flags of what the car did since the step before."""

@@ -12,7 +12,7 @@ TYRES_MPS2 = 8.0  # chosen, because dry asphalt gives about 0.8 g
 PEDAL_LAG = 0.3  # chosen: drivers anticipate, so only this part of the reaction time is left as a lag of the pedal
 NOISE_SMOOTHING_S = 0.3  # chosen, because a foot has no jumps: the jerk of the noise stays finite
 JERK_MPS3 = 12.0  # chosen: brakes build up 4 m/s2 in a third of a second; 15 m/s3 is the limit that is asked for
-LAST_MPS2, EASE_PER_S = 0.8, 1.2  # chosen: people let the brake go before they stand, so that it does not jolt
+LAST_MPS2, EASE_PER_S = 0.8, 2.0  # chosen: people let the brake go before they stand, so that it does not jolt
 CALM_MPS = 5.0  # below this speed the restlessness fades: who stands does not press
 
 
@@ -33,12 +33,12 @@ class Pedal:
         self._noise.retune(style.pedal_noise_mps2, style.pedal_noise_time_s, rng)
         self._lag_s = PEDAL_LAG * style.reaction_time_s
 
-    def press(self, wish_mps2: float, speed_mps: float, dt: float) -> float:
+    def press(self, wish_mps2: float, speed_mps: float, dt: float, *, ready: bool = False) -> float:
         """The pressed acceleration dt seconds later, m/s2; sets `emergency` where the wish needs more than comfort.
 
-        Restlessness alone never brakes harder than comfort.
+        Restlessness alone never brakes harder than comfort. A `ready` foot has reacted already and does not lag.
         """
-        self._foot_mps2 += (wish_mps2 - self._foot_mps2) * dt / max(self._lag_s, dt)
+        self._foot_mps2 += (wish_mps2 - self._foot_mps2) * dt / (dt if ready else max(self._lag_s, dt))
         noise = self._noise.step(dt) * min(max(speed_mps, 0.0) / CALM_MPS, 1.0)
         lowest = max(min(-COMFORT_MPS2, self._foot_mps2), -(LAST_MPS2 + EASE_PER_S * max(speed_mps, 0.0)))
         wanted = min(max(self._foot_mps2 + noise, lowest, -TYRES_MPS2), COMFORT_MPS2)

@@ -43,6 +43,21 @@ def steering_rad(car: Any, lane: Any, *, place_m: float, rate_mps: float, along_
     return min(max(steering, -WHEEL_RAD), WHEEL_RAD)
 
 
+def turned_wheel_rad(wheel_rad: float, wish_rad: float, car: Any, dt: float) -> float:
+    """The wheel angle after dt: as wished, as fast as a driver turns, without more lateral acceleration than accepted.
+
+    In the bicycle model the course turns with the body, v sin(b) / (L / 2), and with the slip b itself, db/dt; both
+    together times the speed are the lateral acceleration, which bounds the new slip.
+    """
+    most = WHEEL_RAD_PS * dt
+    wheel = wheel_rad + min(max(wish_rad - wheel_rad, -most), most)
+    speed = max(car.speed, 1.0)
+    before, wanted = math.atan(math.tan(wheel_rad) / 2), math.atan(math.tan(wheel) / 2)
+    kept, weight = speed * before / dt, speed * speed / (car.LENGTH / 2) + speed / dt
+    slip = min(max(wanted, (kept - LATERAL_MPS2) / weight), (kept + LATERAL_MPS2) / weight)
+    return wheel if slip == wanted else math.atan(2 * math.tan(slip))
+
+
 class LaneKeeping:
     """Where in its lane a driver wants to be: its wander, and the lane change under way."""
 

@@ -30,11 +30,6 @@ class Crew:
         self._twin = twin
         self._differs = twin is not None and twin.at_s is None  # the twin's driver is another one by now
 
-    @property
-    def key(self) -> tuple[int, int]:
-        """(seed, episode)."""
-        return self._key
-
     def stream(self, purpose: str) -> np.random.Generator:
         """The episode's own random stream for that purpose."""
         return stream(*self._key, "", purpose)
@@ -127,8 +122,13 @@ class Traffic:
         return Counter(self.removed.values())
 
 
+def fastest_first(vehicles: Iterable[StyledVehicle]) -> list[StyledVehicle]:
+    """By the speed that their drivers wish, because slower traffic keeps right."""
+    return sorted(vehicles, key=lambda vehicle: (-vehicle.wished_speed_mps, vehicle.driver_id))
+
+
 def highway_traffic(options: HighwayOptions, drawn: Mapping[str, float], crew: Crew, *, time_s: float) -> Traffic:
-    """Cars in loose columns on a straight road that is long enough for the whole episode."""
+    """Cars in loose columns on a straight road that is long enough for the whole episode, faster ones farther left."""
     rng = crew.stream("placement")
     lanes, limit = round(drawn["lanes"]), drawn["speed_limit_mps"]
     spacing = 1000.0 / drawn["density_per_km_lane"]
@@ -137,10 +137,16 @@ def highway_traffic(options: HighwayOptions, drawn: Mapping[str, float], crew: C
     network = RoadNetwork.straight_road_network(lanes, length=float(np.ceil(length / 100) * 100), speed_limit=limit)
     road = StyledRoad(network=network, np_random=crew.stream("road"))
     place = [RUN_UP_M + spacing * rng.uniform(0.0, 0.5) for _ in range(lanes)]
-    for number in range(options.vehicles):
-        lane = number % lanes
-        vehicle = StyledVehicle.make_on_lane(road, ("0", "1", lane), place[lane], limit * rng.uniform(0.8, 0.95))
-        place[lane] += max(spacing * rng.uniform(0.5, 1.5), 2 * vehicle.LENGTH)
-        crew.hire(vehicle)
-        road.vehicles.append(vehicle)
+    speed = limit * rng.uniform(0.8, 0.95, options.vehicles)
+    for first in range(0, options.vehicles, lanes):
+        beside = [
+            StyledVehicle.make_on_lane(road, ("0", "1", 0), 0.0, speed[number])
+            for number in range(first, min(first + lanes, options.vehicles))
+        ]
+        for vehicle in beside:
+            crew.hire(vehicle)
+        for lane, vehicle in enumerate(fastest_first(beside)):
+            vehicle.stand_at(("0", "1", lane), place[lane])
+            place[lane] += max(spacing * rng.uniform(0.5, 1.5), 2 * vehicle.LENGTH)
+            road.vehicles.append(vehicle)
     return Traffic(road, crew, options)

@@ -15,7 +15,7 @@ from stylesim.simulation.highway.lane_choice import Needs, choose_lane, must_cha
 from stylesim.simulation.highway.noise import Wander
 from stylesim.simulation.highway.path import braking_to_yield_mps2, curve_speed_mps
 from stylesim.simulation.highway.pedal import TYRES_MPS2, Pedal
-from stylesim.simulation.highway.steering import WHEEL_RAD, WHEEL_RAD_PS, LaneKeeping, steering_rad
+from stylesim.simulation.highway.steering import WHEEL_RAD, LaneKeeping, steering_rad, turned_wheel_rad
 from stylesim.style import DriverStyle
 
 TOP_SPEED_MPS = 60.0  # chosen, because highway-env's 40 m/s would cut off the wish of bold drivers
@@ -87,8 +87,12 @@ class StyledVehicle(IDMVehicle):  # type: ignore[misc]
         limit = self.style.desired_speed_factor * self.lane.speed_limit
         return min(limit, curve_speed_mps(self, self.style.comfortable_deceleration_mps2)) if self.route else limit
 
-    def aim_at(self, index: tuple[str, str, int]) -> None:
-        """Follow that lane from now on, without changing onto it."""
+    def stand_at(self, index: tuple[str, str, int], along_m: float) -> None:
+        """Put the car onto the centre of a lane, along it."""
+        lane = self.road.network.get_lane(index)
+        self.position = np.array(lane.position(along_m, 0.0), np.float64)
+        self.heading = float(lane.heading_at(along_m))
+        self.lane_index, self.lane = index, lane
         self.target_lane_index = self._steered_lane = index
 
     def act(self, action: Any = None) -> None:
@@ -222,10 +226,9 @@ class StyledVehicle(IDMVehicle):  # type: ignore[misc]
         self._was_yielding = yielding
         self._hesitation_s = max(self._hesitation_s - dt, 0.0)
         self._keeping.step(dt, self.speed)
-        pressed = self._pedal.press(self.action["acceleration"], self.speed, dt)
+        pressed = self._pedal.press(self.action["acceleration"], self.speed, dt, ready=self.stop_ahead_m < math.inf)
         self.emergency_braked |= self._pedal.emergency
-        turn = WHEEL_RAD_PS * dt
-        self._wheel_rad += min(max(self.action["steering"] - self._wheel_rad, -turn), turn)
+        self._wheel_rad = turned_wheel_rad(self._wheel_rad, self.action["steering"], self, dt)
         self.action = {"steering": self._wheel_rad, "acceleration": max(pressed, -self.speed / dt)}
 
     def _is_colliding(self, other: Any, dt: float) -> Any:
