@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -16,6 +16,7 @@ from stylesim.style import STYLE_CLASSES
 if TYPE_CHECKING:
     from stylesim.evaluation.fidelity import Fidelity
     from stylesim.evaluation.fidelity_agreement import Agreement
+    from stylesim.evaluation.freedom import Freedom
     from stylesim.evaluation.intervals import Estimate
 
 
@@ -142,6 +143,25 @@ def show_fidelity(found: Fidelity) -> None:
     _robust(found)
 
 
+def _room(found: Fidelity, episodes: int, seed: int, tell: Callable[[str, int, int], None]) -> tuple[Freedom, ...]:
+    from stylesim.evaluation.freedom import freedom as run
+
+    return run(found.about["scenarios"], episodes=episodes, seed=seed, progress=tell)
+
+
+def _show_room(room: Sequence[Freedom]) -> None:
+    """What one neutral driver's vehicle reached at the extremes, and which classes have no freedom."""
+    for one in room:
+        rows = [
+            [name, f"{low:.2f}", f"{high:.2f}", *by]
+            for name, (low, high), by in zip(one.names, one.reached.tolist(), one.best, strict=True)
+        ]
+        title = f"{one.scenario}: scaled features that a neutral driver's vehicle reaches at the extremes"
+        show_table(f"{title} ({one.drives} drives)", ("feature", "least", "greatest", "least by", "greatest by"), rows)
+        lead = ", ".join(f"{name} {margin:.2f}" for name, margin in one.margin.items())
+        say(f"{one.scenario}: no freedom for {', '.join(one.without()) or 'no class'} (greatest lead: {lead})")
+
+
 def fidelity(
     corpus: Path = typer.Argument(help="A generated corpus."),
     scenario: list[str] = typer.Option([], help="Only these scenarios, repeatable; without it all."),
@@ -150,7 +170,10 @@ def fidelity(
     robustness: bool = typer.Option(
         True, help="Also measure the same drivers with other smoothers, windows, weights and radii (10 more passes)."
     ),
-    seed: int = typer.Option(0, min=0, help="Of the bootstrap of the intervals."),
+    freedom: int = typer.Option(
+        0, min=0, help="Episodes per scenario to drive at every extreme (about 45 runs each): which classes have room."
+    ),
+    seed: int = typer.Option(0, min=0, help="Of the bootstrap of the intervals, and of --freedom."),
 ) -> None:
     """Do drivers measure as commanded? Judged by the shipped frozen scalers, on all drivers logged for 20 s."""
     from stylesim.corpus import Corpus
@@ -172,9 +195,12 @@ def fidelity(
             progress(done, total)
 
         found = run(opened, scenarios=tuple(scenario), with_robustness=robustness, seed=seed, progress=tell)
+        room = _room(found, freedom, seed, tell) if freedom else ()
     show_fidelity(found)
+    _show_room(room)
     if out is not None:
-        text = json.dumps(found.to_dict(), indent=1, sort_keys=True, allow_nan=False, ensure_ascii=False)
+        content = {**found.to_dict(), "freedom": [one.to_dict() for one in room]}
+        text = json.dumps(content, indent=1, sort_keys=True, allow_nan=False, ensure_ascii=False)
         write_whole(out, text.encode())
         say(f"{out}")
     if report is not None:
