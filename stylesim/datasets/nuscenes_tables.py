@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from array import array
 from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -56,18 +57,19 @@ def tables_of(folder: Path) -> Tables:
     return result
 
 
-def _rows(folder: Path, name: str) -> Iterator[dict[str, Any]]:
+@contextmanager
+def _table(folder: Path, name: str) -> Iterator[Iterator[dict[str, Any]]]:
+    """The rows of a table; what a damaged one makes the block raise becomes an error that names it."""
     file = folder / f"{name}.json"
     with reading(file, f"table {name} of nuScenes"):
-        yield from objects(file)
+        yield objects(file)
 
 
 def _indexed(folder: Path, name: str, value: Callable[[dict[str, Any]], Any]) -> dict[str, Any]:
     """Token -> value of every row."""
     result: dict[str, Any] = {}
-    file = folder / f"{name}.json"
-    with reading(file, f"table {name} of nuScenes"):
-        for row in objects(file):
+    with _table(folder, name) as rows:
+        for row in rows:
             token = str(row["token"])
             if token in result:
                 raise ValueError(f"the token {token} is there twice")
@@ -105,14 +107,17 @@ def _samples(folder: Path, result: Tables) -> dict[str, int]:
 def _poses(folder: Path, result: Tables, sample_index: dict[str, int]) -> None:
     """The pose of the vehicle at each sample: that of the lidar's key frame."""
     wanted: dict[str, int] = {}
-    for row in _rows(folder, "sample_data"):
-        if row["is_key_frame"] is True and LIDAR in str(row["filename"]) and str(row["sample_token"]) in sample_index:
-            wanted[str(row["ego_pose_token"])] = sample_index[str(row["sample_token"])]
+    with _table(folder, "sample_data") as rows:
+        for row in rows:
+            key = row["is_key_frame"] is True and LIDAR in str(row["filename"])
+            if key and str(row["sample_token"]) in sample_index:
+                wanted[str(row["ego_pose_token"])] = sample_index[str(row["sample_token"])]
     result.pose = np.full((len(sample_index), 6), np.nan)
-    for row in _rows(folder, "ego_pose"):
-        at = wanted.get(str(row["token"]))
-        if at is not None:
-            result.pose[at] = (*row["translation"][:2], *row["rotation"])
+    with _table(folder, "ego_pose") as rows:
+        for row in rows:
+            at = wanted.get(str(row["token"]))
+            if at is not None:
+                result.pose[at] = (*row["translation"][:2], *row["rotation"])
 
 
 def _annotations(folder: Path, result: Tables, sample_index: dict[str, int]) -> None:
@@ -121,17 +126,18 @@ def _annotations(folder: Path, result: Tables, sample_index: dict[str, int]) -> 
     result.instance_id, result.category_of = list(instances), instances
     number = {token: i for i, token in enumerate(instances)}
     samples, owners, values = array("q"), array("q"), array("d")
-    for row in _rows(folder, "sample_annotation"):
-        sample, owner = sample_index.get(str(row["sample_token"])), number.get(str(row["instance_token"]))
-        if sample is None or owner is None:
-            result.orphans += 1
-            continue
-        numbers = (*row["translation"][:2], *row["size"][:2], *row["rotation"])
-        if len(numbers) != 8:
-            raise InputError(f"{folder}/sample_annotation.json: {row['token']} has {len(numbers)} numbers, not 8")
-        samples.append(sample)
-        owners.append(owner)
-        values.extend(float(n) for n in numbers)
+    with _table(folder, "sample_annotation") as rows:
+        for row in rows:
+            sample, owner = sample_index.get(str(row["sample_token"])), number.get(str(row["instance_token"]))
+            if sample is None or owner is None:
+                result.orphans += 1
+                continue
+            numbers = (*row["translation"][:2], *row["size"][:2], *row["rotation"])
+            if len(numbers) != 8:
+                raise ValueError(f"{row['token']} has {len(numbers)} numbers, not 8")
+            samples.append(sample)
+            owners.append(owner)
+            values.extend(float(n) for n in numbers)
     order = np.argsort(np.frombuffer(samples, np.int64), kind="stable") if len(samples) else np.zeros(0, np.int64)
     result.sample = np.array(samples, np.int64)[order]
     result.instance = np.array(owners, np.int64)[order]
