@@ -139,7 +139,9 @@ def _signals(lights: Mapping[str, Any], n_frames: int) -> tuple[Signals | None, 
 def _road(roads: list[Mapping[str, Any]], stops: dict[str, Any], origin_m: np.ndarray) -> Road | None:
     result = PolylineMap(stops=stops)
     for i, road in enumerate(roads):
-        line = [(p["x"], p["y"]) for p in road["geometry"]] if isinstance(road["geometry"], list) else []
+        line = (
+            [(p["x"], p["y"], p.get("z", 0.0)) for p in road["geometry"]] if isinstance(road["geometry"], list) else []
+        )
         if road["type"] in LANES and line:
             result.lanes.append(PolylineLane(lane_id=str(road.get("id", f"road_{i}")), points=line))
         elif road["type"] == "crosswalk" and line:

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
 from jaxtyping import Float32, Float64
 
+from stylesim.datasets.crossings import crossing
 from stylesim.datasets.polylines import map_line, nearest_points, stop_line_at
 from stylesim.geometry import wrap_angle
 from stylesim.road import Lane, Road
@@ -26,7 +27,7 @@ class PolylineLane:
     """One lane as such a map has it."""
 
     lane_id: str
-    points: Any  # [point, 2 or 3] in the source's frame
+    points: Any  # [point, 2], or 3 with heights, in the source's frame
     speed_limit_mps: float = float("nan")
     successors: Sequence[str] = ()
     left_boundaries: Sequence[Stretch] = ()
@@ -49,18 +50,23 @@ class PolylineMap:
 def road_of(features: PolylineMap, origin_m: Float64[np.ndarray, " 2"], *, link_ends: bool = False) -> Road:
     """The road in metres from `origin_m`. `link_ends`: successors follow from ends that meet.
 
-    Lanes of less than two points are left out. ValueError where a point is damaged.
+    Where no lane is marked as in a junction, those are that cross another one. Lanes of less than two points are
+    left out. ValueError where a point is damaged.
     """
     lines = {key: map_line(points, origin_m) for key, points in features.lines.items()}
     centres = {lane.lane_id: map_line(lane.points, origin_m) for lane in features.lanes}
     centres = {key: line for key, line in centres.items() if len(line) >= 2}
     follows = meeting(centres) if link_ends else {}
+    marked = {lane.lane_id for lane in features.lanes if lane.in_junction}
+    junction = marked or crossing({lane.lane_id: lane.points for lane in features.lanes if lane.lane_id in centres})
     lanes = []
     for lane in features.lanes:
         if lane.lane_id in centres:
             links = follows.get(lane.lane_id, ()) if link_ends else lane.successors
             successors = tuple(dict.fromkeys(s for s in links if s in centres))
-            lanes.append(_lane(lane, centres, lines, successors, features.stops.get(lane.lane_id), origin_m))
+            stop = features.stops.get(lane.lane_id)
+            made = _lane(lane, centres, lines, successors, stop, origin_m)
+            lanes.append(replace(made, in_junction=lane.lane_id in junction))
     walks = tuple(walk for walk in (map_line(c, origin_m) for c in features.crosswalks) if len(walk) >= 3)
     return Road(lanes=tuple(lanes), source="map", crosswalks_m=walks)
 
@@ -90,7 +96,6 @@ def _lane(
         successors=successors,
         left_neighbour=_longest(lane.left_neighbours, centres),
         right_neighbour=_longest(lane.right_neighbours, centres),
-        in_junction=lane.in_junction,
         stop_line_m=None if point is None else stop_line_at(point, centre, width),
     )
 

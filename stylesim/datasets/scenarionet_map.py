@@ -42,7 +42,7 @@ def _lane(lane_id: str, feature: Mapping[str, Any], limits: bool) -> PolylineLan
     neighbour = ("feature_id", "self_start_index", "self_end_index")
     return PolylineLane(
         lane_id=lane_id,
-        points=np.asarray(feature["polyline"], np.float64),
+        points=np.asarray(feature["polyline"], np.float64)[:, :2],  # a third column is a height or a heading
         speed_limit_mps=limit,
         successors=[str(i) for i in feature.get("exit_lanes") or ()],
         left_boundaries=_stretches(feature.get("left_boundaries"), boundary),

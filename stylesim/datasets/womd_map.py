@@ -37,16 +37,16 @@ def map_of(data: bytes, features: list[wire.Span]) -> PolylineMap:
     return result
 
 
-def points(data: bytes, found: list[wire.Span]) -> Float64[np.ndarray, "point 2"]:
-    """The x and y of MapPoints."""
+def points(data: bytes, found: list[wire.Span]) -> Float64[np.ndarray, "point 3"]:
+    """The x, y and z of MapPoints."""
     rows, same = wire.fixed(data, found, _POINT)
     regular = (rows["x_tag"] == 0x09) & (rows["y_tag"] == 0x11) & (rows["z_tag"] == 0x19)
     same[same] = regular
-    result = np.full((len(found), 2), np.nan)
-    result[same] = np.stack([rows["x"][regular], rows["y"][regular]], -1)
+    result = np.full((len(found), 3), np.nan)
+    result[same] = np.stack([rows[name][regular] for name in ("x", "y", "z")], -1)
     for i in np.flatnonzero(~same).tolist():
         point = wire.fields(data, found[i])
-        result[i] = wire.real(data, point, 1, 0.0), wire.real(data, point, 2, 0.0)  # proto2: missing is 0
+        result[i] = [wire.real(data, point, number, 0.0) for number in (1, 2, 3)]  # proto2: missing is 0
     return result
 
 

@@ -177,6 +177,7 @@ def test_a_real_scenario(shared_data):
     stated = {(lane.lane_id, s) for lane in scene.road.lanes for s in lane.successors}
     by_ends = meeting({lane.lane_id: lane.centre_line_m for lane in scene.road.lanes})
     assert stated == {(a, b) for a, found in by_ends.items() for b in found}  # what the tf.Example reader relies on
+    assert sum(lane.in_junction for lane in scene.road.lanes) > 20
     widths = np.array([lane.width_m for lane in scene.road.lanes])
     assert 3.0 < np.nanmedian(widths) < 4.0
     assert len(scene.signals.signal_id) == 12
