@@ -15,6 +15,7 @@ from stylesim.errors import InputError, unknown
 from stylesim.merging.balance import ROW, check_balance, equal_shares, require_labels, style_groups
 from stylesim.merging.carry import carried_kinds, carried_labels
 from stylesim.merging.clock import COMMON_DT_S, on_common_clock
+from stylesim.merging.kin import Kinship, kept_together, kinship, leaks
 from stylesim.merging.noise import NoiseModel, with_noise
 from stylesim.merging.noise_fit import recorded_sources, train_noise
 from stylesim.merging.splits import SplitPlan, plan_splits
@@ -35,6 +36,8 @@ class _Plan:
     splits: SplitPlan
     new_id: Mapping[SceneKey, str]  # of the scenes that are kept
     dropped: Mapping[SceneKey, Mapping[str, int]]  # agents taken out of a scene, with their steps
+    kin: Kinship
+    parted: frozenset[SceneKey]  # scenes whose official split would show a driver on both sides
     noise: tuple[NoiseModel, ...]
     seed: int
 
@@ -59,8 +62,12 @@ def merge(
     as noisy as the recorded ones of the training split (`noise`); labels of the inputs do not hold any more then,
     so label the result and call `balance`. Without it, labels made by one labeller are taken over.
 
+    Scenes that show (nearly) the same driving as an earlier one are left out, and what shows some of it, like a
+    counterfactual twin or a replay and its recording, stays on one side of the split (`likeness`, `kin`).
+
     Raises InputError for no corpus, one given twice, bad shares, missing labels (naming the command to run), noise
-    without recorded tracks. Counted: scenes in guard gaps, agents taken out of a second block, labels left behind.
+    without recorded tracks. Counted: near-duplicates, scenes in guard gaps, agents taken out of a second block,
+    labels left behind.
     """
     check_balance(balance)
     inputs = _checked(corpora)
@@ -121,7 +128,13 @@ def _plan(
     spec: WindowSpec,
 ) -> _Plan:
     infos = [(number, info) for number, corpus in enumerate(inputs) for info in corpus.info]
+    everything = {(number, info.scene_id) for number, info in infos}
+    kin = kinship(infos, _keyed(inputs, everything))
+    infos = [(number, info) for number, info in infos if (number, info.scene_id) not in kin.duplicate_of]
     splits = plan_splits(infos, shares=split, seed=seed, guard_s=spec.history_s + spec.future_s)
+    splits, parted = kept_together(splits, infos, kin)
+    for leak in leaks(infos, splits.split, splits, kin):
+        raise InputError(f"the split would leak: {leak}; merge these corpora apart")
     dropped = _second_blocks(inputs, splits)
     often = Counter(info.scene_id for _, info in infos)
     new_id = {
@@ -131,7 +144,7 @@ def _plan(
         and len(dropped.get((number, info.scene_id), {})) < max(1, info.n_agents)
     }
     models = train_noise(inputs, splits) if noise else ()
-    return _Plan(inputs, splits, new_id, dropped, models, seed)
+    return _Plan(inputs, splits, new_id, dropped, kin, parted, models, seed)
 
 
 def _second_blocks(inputs: Sequence[Corpus], splits: SplitPlan) -> dict[SceneKey, dict[str, int]]:
@@ -204,13 +217,17 @@ def _said(plan: _Plan, balance: str, split: tuple[float, float, float], left: li
 
 
 def _counts(plan: _Plan) -> dict[str, int]:
-    """Agent-steps in = agent-steps out (before any resampling) + those in guard gaps + those taken out."""
+    """Agent-steps in = agent-steps out (before any resampling) + those left out, by reason."""
     infos = [((number, info.scene_id), info) for number, corpus in enumerate(plan.corpora) for info in corpus.info]
     return {
+        "near_duplicate_scenes": len(plan.kin.duplicate_of),
+        "scenes_parted_by_official_splits": len(plan.parted),
         "scenes_in_guard_gaps": len(plan.splits.guarded),
         "tracks_taken_out_of_a_second_block": sum(len(agents) for agents in plan.dropped.values()),
         "scenes_without_an_agent_left": len(plan.splits.split) - len(plan.new_id),
         "steps_in": sum(info.n_steps for _, info in infos),
+        "steps_in_near_duplicates": sum(info.n_steps for key, info in infos if key in plan.kin.duplicate_of),
+        "steps_parted_by_official_splits": sum(info.n_steps for key, info in infos if key in plan.parted),
         "steps_in_guard_gaps": sum(info.n_steps for key, info in infos if key in plan.splits.guarded),
         "steps_taken_out": sum(sum(agents.values()) for agents in plan.dropped.values()),
     }
