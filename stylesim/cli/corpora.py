@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Any
 
 import typer
 
@@ -82,7 +83,19 @@ def merge(
         rows.append((name, len(infos), units, sum(info.n_agents for info in infos)))
     show_table("Splits", ("split", "scenes", "units", "tracks"), rows)
     show_table("Counted", ("what", "n"), sorted(merged.manifest["counts"].items()))
+    tell = merged.manifest["configuration"].get("noise_telltale")
+    if tell is not None:
+        areas = [(name, *_area(found)) for name, found in tell.items()]
+        heads = ("noise", "area under the ROC curve", "simulated, recorded drivers")
+        show_table("Can noise alone tell simulated from recorded tracks? (0.5: no, 1: always)", heads, areas)
     say(f"{out}")
+
+
+def _area(found: dict[str, Any]) -> tuple[str, str]:
+    if found["area"] is None:
+        return "not measured", found["why"]
+    interval = f"{found['area']:.2f} [{found['low']:.2f}, {found['high']:.2f}]"
+    return interval, f"{found['simulated_drivers']}, {found['recorded_drivers']}"
 
 
 def balance(

@@ -19,6 +19,7 @@ from stylesim.merging.kin import Kinship, kept_together, kinship, leaks
 from stylesim.merging.noise import NoiseModel, with_noise
 from stylesim.merging.noise_fit import recorded_sources, train_noise
 from stylesim.merging.splits import SplitPlan, plan_splits
+from stylesim.merging.telltale import NoiseTraces, as_stored, telltale, traces
 from stylesim.merging.time_blocks import Sight, one_block_each
 from stylesim.randomness import stream
 from stylesim.scene import Scene
@@ -78,6 +79,8 @@ def merge(
     plan = _plan(inputs, split=split, seed=seed, noise=noise, spec=spec or WindowSpec())
     weights = _weights(plan, balance)
     said = _said(plan, balance, split, left)
+    if plan.noise:
+        said["noise_telltale"] = _telltale(plan)
     with CorpusWriter(out, source="merge", configuration=said, seed=seed, resume=resume) as writer:
         for done, (key, scene) in enumerate(_scenes(plan), start=1):
             writer.add(scene, split=plan.splits.split[key])
@@ -168,16 +171,18 @@ def _keyed(inputs: Sequence[Corpus], chosen: Container[SceneKey]) -> Iterator[tu
             yield (number, scene.scene_id), scene
 
 
-def _scenes(plan: _Plan) -> Iterator[tuple[SceneKey, Scene]]:
-    """The scenes as they are written."""
+def _scenes(
+    plan: _Plan, *, noise: bool = True, only: Container[SceneKey] | None = None
+) -> Iterator[tuple[SceneKey, Scene]]:
+    """The scenes as they are written; with `noise=False` as they would be without it."""
     recorded = recorded_sources()
-    for key, scene in _keyed(plan.corpora, plan.new_id):
+    for key, scene in _keyed(plan.corpora, plan.new_id if only is None else only):
         strangers = plan.dropped.get(key, {})
         if strangers:
             keep = np.array([agent not in strangers for agent in scene.tracks.agent_id])
             scene = replace(scene, tracks=scene.tracks.select(keep))
         scene = on_common_clock(scene)
-        if plan.noise and scene.source not in recorded:
+        if noise and plan.noise and scene.source not in recorded:
             number = stream(plan.seed, 0, scene.unit_id, "sensor").integers(len(plan.noise))
             scene = with_noise(scene, plan.noise[int(number)], seed=plan.seed)
         yield key, replace(scene, scene_id=plan.new_id[key], twin_of=_renamed(plan, key[0], scene.twin_of))
@@ -203,6 +208,27 @@ def _weights(plan: _Plan, balance: str) -> dict[ROW, float]:
         for labels in carried_labels(plan.corpora, balance, "track", new_id=plan.new_id, dropped=plan.dropped):
             group |= {row: name for row, name in style_groups(labels).items() if row[0] in wanted}
     return equal_shares(group)
+
+
+def _telltale(plan: _Plan) -> dict[str, Any]:
+    """How well noise alone tells simulated from recorded training tracks, before and after noise was added."""
+    recorded = recorded_sources()
+    train = {key for key in plan.new_id if plan.splits.split[key] == "train"}
+    sides: dict[str, NoiseTraces] = {}
+    for name, added in (("recorded", False), ("before", False), ("after", True)):
+        chosen = (
+            scene
+            for _, scene in _scenes(plan, noise=added, only=train)
+            if (scene.source in recorded) == (name == "recorded")
+        )
+        sides[name] = traces(map(as_stored, chosen))
+    result: dict[str, Any] = {}
+    for name in ("before", "after"):
+        try:
+            result[name] = telltale(sides[name], sides["recorded"], seed=plan.seed).to_dict()
+        except InputError as error:
+            result[name] = {"area": None, "why": str(error)}
+    return result
 
 
 def _said(plan: _Plan, balance: str, split: tuple[float, float, float], left: list[str]) -> dict[str, Any]:
