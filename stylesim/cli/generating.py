@@ -65,6 +65,9 @@ def generate(
     ),
     styles: str | None = typer.Option(None, help="All shares, sum 1: aggressive=0.3,careful=0.7."),
     reweight: str | None = typer.Option(None, help="Set some shares, scale the rest: aggressive=0.3."),
+    calibration: Path | None = typer.Option(
+        None, help="A file of `stylesim calibrate` to drive by.", show_default="what ships"
+    ),
     episodes: int = typer.Option(10, min=1, help="Episodes per scenario."),
     seed: int = typer.Option(0, min=0, help="Same seed, same bytes."),
     workers: int = typer.Option(1, min=1, help="Simulations side by side, one process each."),
@@ -87,6 +90,8 @@ def generate(
     from stylesim.simulation.generate import generate as run
 
     crowd = chosen_population(population, styles, reweight)
+    if calibration is not None:
+        crowd = crowd.calibrated(calibration)
     twins = wanted_twins(twins_at, twins_from, twin_style, null=twin_null)
     plan = EpisodePlan(stressors=stressors_of(stressor) if stressor else ())
     with progress_bar("generating", "episodes") as progress:

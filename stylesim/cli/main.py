@@ -12,6 +12,7 @@ from typer.core import TyperGroup
 
 from stylesim import __version__
 from stylesim.cli import (
+    calibrating,
     comparing,
     corpora,
     describing,
@@ -60,6 +61,7 @@ app = typer.Typer(
 )
 for module in (
     generating,
+    calibrating,
     corpora,
     labelling,
     measuring,

@@ -115,7 +115,8 @@ def _signals(meta: Mapping[str, Any] | None, rows: pl.DataFrame, n_frames: int) 
 def _driver(row: Mapping[str, Any]) -> DriverStyle | None:
     if row["driver"] is None:
         return None
-    return DriverStyle(row["driver"], **dict(zip(DRIVER_PARAMETERS, row["driver_parameters"], strict=True)))
+    # Corpora written before a parameter existed have a shorter list; the rest takes the parameter's default.
+    return DriverStyle(row["driver"], **dict(zip(DRIVER_PARAMETERS, row["driver_parameters"], strict=False)))
 
 
 def part_tables(folder: Path, part: int) -> tuple[pl.DataFrame, pl.DataFrame, pl.DataFrame]:

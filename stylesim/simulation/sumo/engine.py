@@ -36,6 +36,7 @@ class VehicleApi(Protocol):
     def setSpeed(self, vehID: str, speed: float) -> None: ...  # noqa: D102, N802
     def getSpeedMode(self, vehID: str) -> int: ...  # noqa: D102, N802
     def setSpeedMode(self, vehID: str, sm: int) -> None: ...  # noqa: D102, N802
+    def getLaneID(self, vehID: str) -> str: ...  # noqa: D102, N802
     def setType(self, vehID: str, typeID: str) -> None: ...  # noqa: D102, N802
     def setSpeedFactor(self, vehID: str, factor: float) -> None: ...  # noqa: D102, N802
     def setParameter(self, objectID: str, key: str, value: str) -> None: ...  # noqa: D102, N802

@@ -12,6 +12,7 @@ from stylesim.simulation.plan import PLAIN, EpisodePlan
 from stylesim.simulation.stressors import check_possible, with_events
 from stylesim.simulation.sumo.engine import Engine
 from stylesim.simulation.sumo.episode import DT_S, EpisodeFiles, prepare_episode, sumo_options
+from stylesim.simulation.sumo.flow import FlowSense
 from stylesim.simulation.sumo.recorder import RawLog, Recorder
 from stylesim.simulation.sumo.scenes import scene_of
 from stylesim.simulation.sumo.stopzone import StopZone
@@ -56,9 +57,10 @@ class SumoBackend:
         first = max(0, round((files.warm_up_s - LEAD_S) / DT_S))
         recorder = Recorder(engine.sumo, signals=files.signals, first_step=first)
         yellow, zone = YellowController(engine.sumo, files), StopZone(engine.sumo, files)
-        switch = StyleSwitch(engine.sumo, files, yellow)
+        switch, flow = StyleSwitch(engine.sumo, files, yellow), FlowSense(engine.sumo, files)
         for step in range(round(files.end_s / DT_S)):
             switch.before_step(step)
+            flow.before_step(step)
             yellow.before_step(step)
             zone.before_step(step)
             if stressing is not None:

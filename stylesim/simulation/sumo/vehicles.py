@@ -10,6 +10,7 @@ from stylesim.style import DriverStyle
 from stylesim.tracks import AgentKind
 
 LANE_WIDTH_M = 3.5  # chosen, because lane_change_duration_s must become a lateral speed and 3.5 m is a usual lane
+NEUTRAL_HEADWAY_S = 1.5
 NEUTRAL_GAP_S = 4.5  # agents/styles.yaml: the gap acceptance at which SUMO's own defaults are kept
 # sd of the acceleration that EIDM's sigmaerror = 1 gives at tPersDrive = 0.8 s: 0.72 at 0.3 and 0.30 at 0.1
 # (60 vehicles, free motorway, measured with SUMO 1.28; docs/logging.md), so about 2.6.
@@ -93,7 +94,7 @@ def type_attributes(driver: Driver) -> dict[str, str]:
         "lcMaxSpeedLatFactor": 0.3,
         "lcSpeedGain": style.lane_change_eagerness,
         "lcCooperative": min(1.0, style.politeness),
-        "lcAssertive": NEUTRAL_GAP_S / style.gap_acceptance_s,
+        "lcAssertive": NEUTRAL_GAP_S / style.gap_acceptance_s * style.time_headway_s / NEUTRAL_HEADWAY_S,
         "jmTimegapMinor": style.gap_acceptance_s / NEUTRAL_GAP_S,
     }
     words = {"vClass": "truck" if truck else "passenger", "carFollowModel": "EIDM", "laneChangeModel": "LC2013"}
