@@ -43,14 +43,14 @@ HIGH = np.log([b.high for b in BEHAVIOURS])
 # some wander, cautious ones slow and very smooth with a far gap, timid ones a little faster with the farthest gap.
 _START = {
     MOTORWAY: {
-        COMFORT: (37.0, 43.0, 37.5, 30.5, 30.5, 34.5),
-        "time_headway_s": (0.9, 1.5, 0.9, 1.8, 2.6, 3.0),
+        COMFORT: (38.0, 44.0, 38.0, 30.5, 31.0, 34.5),
+        "time_headway_s": (0.9, 1.6, 0.9, 1.9, 2.6, 3.0),
         "max_acceleration_mps2": (3.2, 2.2, 2.4, 1.6, 1.3, 1.8),
-        "pedal_noise_mps2": (1.2, 0.4, 0.1, 0.3, 0.03, 0.65),
-        "lane_wander_m": (0.47, 0.62, 0.2, 0.27, 0.14, 0.05),
-        "lane_change_eagerness": (5.0, 5.0, 5.0, 0.1, 0.1, 0.3),
-        "flow_share": (0.1, 0.1, 0.4, 0.6, 0.6, 0.7),
-        "flow_speed_factor": (1.12, 1.15, 1.15, 0.92, 0.92, 0.96),
+        "pedal_noise_mps2": (1.2, 0.45, 0.1, 0.3, 0.03, 0.62),
+        "lane_wander_m": (0.48, 0.62, 0.2, 0.24, 0.1, 0.04),
+        "lane_change_eagerness": (5.0, 5.0, 5.0, 0.1, 0.1, 0.2),
+        "flow_share": (0.02, 0.02, 0.4, 0.7, 0.6, 0.7),
+        "flow_speed_factor": (1.12, 1.15, 1.15, 0.92, 0.94, 0.98),
     },
     OTHER: {
         COMFORT: (17.5, 19.0, 18.0, 13.0, 12.5, 15.0),

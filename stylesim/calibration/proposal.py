@@ -22,7 +22,7 @@ from stylesim.errors import InputError
 from stylesim.style import STYLE_CLASSES
 from stylesim.styles import COMFORT, Calibration
 
-FIRST_SD = 0.14  # of a log; chosen, because the start is near and 2 sd are a quarter
+FIRST_SD = 0.10  # of a log; chosen, because the start is near and 2 sd are a fifth
 LAST_SD = 0.05  # chosen, because people of one style differ
 STEP = 1.5  # sds that a behaviour moves when it explains success wholly; chosen: 2 overshoots, 1 takes twice the rounds
 SOFT_MARGIN = 0.2  # score at which success counts 0.73; chosen, the width of a fragile margin (REFERENCE section 1)
