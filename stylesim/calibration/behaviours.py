@@ -21,22 +21,24 @@ class Behaviour:
     name: str
     low: float
     high: float
+    width: float = 1.0  # of the search relative to the others: a speed is felt at a few percent, a gap at a fifth
 
 
 # The limits are those of agents/styles.yaml where that table has them; a lower limit of 0 is replaced by the smallest
 # value that still differs from it on the road [ours].
 BEHAVIOURS = (
-    Behaviour(COMFORT, 8.0, 46.0),
+    Behaviour(COMFORT, 8.0, 46.0, 0.3),
     Behaviour("time_headway_s", 0.8, 4.5),
     Behaviour("max_acceleration_mps2", 0.8, 4.0),
     Behaviour("pedal_noise_mps2", 0.02, 1.3),
     Behaviour("lane_wander_m", 0.03, 0.7),
     Behaviour("lane_change_eagerness", 0.05, 6.0),
     Behaviour("flow_share", 0.02, 0.9),
-    Behaviour("flow_speed_factor", 0.7, 1.4),
+    Behaviour("flow_speed_factor", 0.7, 1.4, 0.3),
 )
 LOW = np.log([b.low for b in BEHAVIOURS])
 HIGH = np.log([b.high for b in BEHAVIOURS])
+WIDTH = np.array([b.width for b in BEHAVIOURS])
 
 # Made by hand from the signs of the TDBM matrix (REFERENCE section 1) and a few trials: aggressive drivers are jerky
 # and fast, reckless ones fastest with a wide wander, threatening ones fast, smooth and centred, careful ones slow with

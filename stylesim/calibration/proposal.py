@@ -16,13 +16,13 @@ from typing import Any
 import numpy as np
 from jaxtyping import Float64, Int64
 
-from stylesim.calibration.behaviours import BEHAVIOURS, HIGH, LARGEST_SPEED_FACTOR, LOW, start
+from stylesim.calibration.behaviours import BEHAVIOURS, HIGH, LARGEST_SPEED_FACTOR, LOW, WIDTH, start
 from stylesim.calibration.measuring import Trial
 from stylesim.errors import InputError
 from stylesim.style import STYLE_CLASSES
 from stylesim.styles import COMFORT, Calibration
 
-FIRST_SD = 0.10  # of a log; chosen, because the start is near and 2 sd are a fifth
+FIRST_SD = 0.12  # of a log, times the width; chosen, because the start is near and 2 sd are a quarter
 LAST_SD = 0.05  # chosen, because people of one style differ
 STEP = 1.5  # sds that a behaviour moves when it explains success wholly; chosen: 2 overshoots, 1 takes twice the rounds
 SOFT_MARGIN = 0.2  # score at which success counts 0.73; chosen, the width of a fragile margin (REFERENCE section 1)
@@ -43,11 +43,11 @@ Proposal = dict[str, Law]  # by kind of road
 
 def first_proposal(roads: tuple[str, ...]) -> Proposal:
     """Where the search begins."""
-    return {road: Law(start(road), np.full((len(STYLE_CLASSES), len(BEHAVIOURS)), FIRST_SD)) for road in roads}
+    return {road: Law(start(road), np.tile(FIRST_SD * WIDTH, (len(STYLE_CLASSES), 1))) for road in roads}
 
 
 def updated(proposal: Proposal, trial: Trial, *, sd: float) -> Proposal:
-    """The laws after a round; `sd` is what the next one draws with."""
+    """The laws after a round; `sd` (times the widths) is what the next one draws with."""
     road = np.array(trial.road, dtype=object)
     result = {}
     for name, law in proposal.items():
@@ -56,7 +56,7 @@ def updated(proposal: Proposal, trial: Trial, *, sd: float) -> Proposal:
             own = np.flatnonzero((road == name) & (trial.commanded == style))
             if len(own) >= LEAST_DRIVERS:
                 mean[style] += STEP * law.sd[style] * _correlation(trial, own)
-        result[name] = Law(np.clip(mean, LOW, HIGH), np.full_like(law.sd, sd))
+        result[name] = Law(np.clip(mean, LOW, HIGH), np.tile(sd * WIDTH, (len(STYLE_CLASSES), 1)))
     return result
 
 
@@ -114,5 +114,5 @@ def proposal_of(calibration: Calibration) -> Proposal:
             raise InputError(f"the calibration to start from has no {lacking[0]!r} for {road!r}; start without it")
         ends = [[(ranges[b.name][name].calm, ranges[b.name][name].bold) for b in BEHAVIOURS] for name in STYLE_CLASSES]
         middle = np.log(np.maximum(np.array(ends), 1e-3)).mean(axis=2)
-        result[str(road)] = Law(np.clip(middle, LOW, HIGH), np.full_like(middle, FIRST_SD))
+        result[str(road)] = Law(np.clip(middle, LOW, HIGH), np.tile(FIRST_SD * WIDTH, (len(STYLE_CLASSES), 1)))
     return result
