@@ -1,4 +1,4 @@
-"""The CSV tables of DLR Urban Traffic, checked and turned into a `Recording`."""
+"""The CSV tables of DLR Urban Traffic and DLR Highway Traffic, checked and turned into a `Recording`."""
 
 from __future__ import annotations
 
@@ -48,8 +48,10 @@ _COLUMNS: dict[str, Any] = {
 }
 
 
-def recording_from(tracks: Path, lights: Path | None, stamp: Stamp | None) -> tuple[Recording, int]:
-    """The recording in `tracks`, and the time of its frame 0 in UTC microseconds.
+def recording_from(
+    tracks: Path, lights: Path | None, stamp: Stamp | None, *, source: str = "dlr_ut"
+) -> tuple[Recording, int]:
+    """The recording in `tracks`, and the time of its frame 0 in UTC microseconds; `source` begins its name.
 
     Dropped and counted: `unreadable` (a number, time or flag that is none), `outside_recording` (not between the
     times in the file's name), `off_clock` (on no frame), `duplicate` (a second row of an agent in a frame),
@@ -73,7 +75,8 @@ def recording_from(tracks: Path, lights: Path | None, stamp: Stamp | None) -> tu
     table = table.unique(["id", "frame"], keep="first", maintain_order=True).sort("id", "frame")
     dropped["duplicate"] = rows - table.height
     log = None if lights is None else signal_log(lights, begin)
-    return _recording(tracks, stamp, table, log, dropped), begin
+    name = f"{source}_{stamp.text if stamp else tracks.name.split('.')[0]}"
+    return _recording(name, table, log, dropped), begin
 
 
 def _kept(table: pl.DataFrame, condition: pl.Expr, reason: str, dropped: dict[str, int]) -> pl.DataFrame:
@@ -100,9 +103,7 @@ def _on_clock(table: pl.DataFrame, tracks: Path, dropped: dict[str, int]) -> tup
     return table.with_columns((pl.col("grid") - first).alias("frame")), first * STEP_US + phase
 
 
-def _recording(
-    tracks: Path, stamp: Stamp | None, table: pl.DataFrame, log: SignalLog | None, dropped: dict[str, int]
-) -> Recording:
+def _recording(name: str, table: pl.DataFrame, log: SignalLog | None, dropped: dict[str, int]) -> Recording:
     ids, agent = np.unique(table["id"].to_numpy(), return_inverse=True)
     frame = table["frame"].to_numpy().astype(np.int64)
     first = np.searchsorted(agent, np.arange(len(ids)))  # first row of each agent: what is known when it appears
@@ -113,7 +114,7 @@ def _recording(
     slow = np.hypot(*velocity[last].T) < STANDING_MPS
     ended_early = frame[last] < frame.max() - 1_000_000 // STEP_US
     return Recording(
-        recording_id="dlr_ut_" + (stamp.text if stamp else tracks.name.split(".")[0]),
+        recording_id=name,
         agent_id=tuple(str(i) for i in ids),
         kind=kind,
         size_m=size.astype(np.float32),

@@ -9,13 +9,13 @@ frozen road of the site (`site_roads`), or are inferred from the recording itsel
 from __future__ import annotations
 
 from collections.abc import Iterator
-from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
 from jaxtyping import Float64
 
 from stylesim.datasets.cutting import SCENE_S, cut
+from stylesim.datasets.dlr_folders import JOINED_WITHIN_S, track_files
 from stylesim.datasets.dlr_tables import recording_from
 from stylesim.datasets.inferred_road import infer_road
 from stylesim.datasets.recording import Recording
@@ -23,13 +23,10 @@ from stylesim.datasets.resampling import decimated
 from stylesim.datasets.site_roads import SiteRoad, load_site_road, site_road_at
 from stylesim.datasets.sniffing import header, matching
 from stylesim.datasets.stamps import Stamp
-from stylesim.errors import InputError
 from stylesim.road import Road
 from stylesim.scene import Scene
 
 SOURCE = "dlr_ut"
-# Chosen: files whose names join within a minute are one continuous recording, hence one unit of splitting.
-JOINED_WITHIN_S = 60.0
 
 
 def scenes(path: str | Path, *, scene_s: float = SCENE_S, road: str = "site") -> Iterator[Scene]:
@@ -40,7 +37,7 @@ def scenes(path: str | Path, *, scene_s: float = SCENE_S, road: str = "site") ->
     forecasting); "none" gives scenes without lanes; anything else is a file that `save_site_road` wrote.
     InputError names the file that is missing, damaged, or in other units.
     """
-    files = _track_files(Path(path))
+    files = track_files(Path(path), "DLR Urban Traffic")
     chosen = None if road in ("site", "infer", "none") else load_site_road(Path(road))
     unit_id, unit_begin, previous = "", 0, None
     for file in files:
@@ -80,20 +77,6 @@ def _site(road: str, chosen: SiteRoad | None, raw: Recording) -> tuple[str, Road
     if road == "none" or known is None:
         return name, None, origin
     return name, known.road, known.origin_m
-
-
-def _track_files(path: Path) -> list[Path]:
-    if path.is_file():
-        return [path]
-    if not path.is_dir():
-        raise InputError(f"{path} does not exist; give a trajectories_*.csv.gz, or a folder of them")
-    files = sorted([*path.glob("trajectories_*.csv.gz"), *path.glob("trajectories_*.csv")])
-    if not files:
-        raise InputError(f"{path} holds no trajectories_*.csv.gz; it is no folder of DLR Urban Traffic")
-    for one, other in pairwise(files):
-        if one.name.split(".")[0] == other.name.split(".")[0]:
-            raise InputError(f"{one} and {other} are the same recording; remove one of them")
-    return files
 
 
 def _lights_file(tracks: Path) -> Path | None:

@@ -33,9 +33,9 @@ def row() -> pl.Expr:
 
 
 def nearby(table: pl.DataFrame) -> pl.Expr:
-    """True for a row that is no farther than MAX_DISTANCE_M from the middle of all rows."""
+    """True for a row that is within half of MAX_DISTANCE_M of the middle of all rows: no two are farther apart."""
     names = ("center_easting", "center_northing")
-    return pl.all_horizontal(*((pl.col(n) - table[n].median()).abs() <= MAX_DISTANCE_M for n in names))
+    return pl.all_horizontal(*((pl.col(n) - table[n].median()).abs() <= MAX_DISTANCE_M / 2 for n in names))
 
 
 def whole_file(table: pl.DataFrame, path: Path) -> None:

@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import gzip
+import warnings
 import zlib
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
@@ -29,20 +31,34 @@ def file_bytes(path: Path) -> bytes:
         raise InputError(f"cannot read {path}: {error.strerror or error}") from error
 
 
-def csv_table(path: Path, columns: Mapping[str, Any]) -> pl.DataFrame:
+@contextmanager
+def refusing_malformed(path: Path) -> Iterator[None]:
+    """A block that parses a CSV file with polars: what polars only warns of (rows that do not add up) is refused."""
+    with warnings.catch_warnings(record=True) as found:
+        warnings.simplefilter("always")
+        yield
+    said = [str(one.message) for one in found if "malformed" in str(one.message)]
+    if said:
+        raise InputError(f"{path} is no readable CSV table ({said[0][:200]}); is a quote missing?")
+
+
+def csv_table(path: Path, columns: Mapping[str, Any], *, separator: str = ",") -> pl.DataFrame:
     """The named columns of a CSV file with a header, in those polars types; what cannot be parsed is null.
 
     InputError where the file is no text, empty, or lacks a column.
     """
     raw = file_bytes(path)
-    header = raw.split(b"\n", 1)[0].decode("utf-8-sig", errors="replace").strip().split(",")
+    header = raw.split(b"\n", 1)[0].decode("utf-8-sig", errors="replace").strip().split(separator)
     absent = [name for name in columns if name not in header]
     if absent:
         found = ", ".join(header)[:300]
         raise InputError(f"{path} lacks the columns {', '.join(absent)}; its first line has: {found or 'nothing'}")
-    options: dict[str, Any] = {"schema_overrides": dict(columns), "ignore_errors": True, "columns": list(columns)}
+    options: dict[str, Any] = {
+        "schema_overrides": dict(columns), "ignore_errors": True, "columns": list(columns), "separator": separator,
+    }  # fmt: skip
     try:
-        return pl.read_csv(raw, **options)
+        with refusing_malformed(path):
+            return pl.read_csv(raw, **options)
     except pl.exceptions.PolarsError as error:
         raise InputError(f"{path} is no readable CSV table: {str(error).splitlines()[0]}") from error
 

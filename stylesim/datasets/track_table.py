@@ -1,7 +1,8 @@
 """From a long table in standard columns to a checked `Recording`: what readers of tables share.
 
 Standard columns: `agent` (text), `frame` (integer, from 0 on), `x`, `y` (m), and where the source has them `vx`, `vy`
-(m/s), `heading` (rad, counter-clockwise from +x), `length`, `width` (m), `kind` (number of an `AgentKind`).
+(m/s) or `speed` (m/s, along the heading), `heading` (rad, counter-clockwise from +x), `length`, `width` (m), `kind`
+(number of an `AgentKind`).
 """
 
 from __future__ import annotations
@@ -13,10 +14,11 @@ import numpy as np
 import polars as pl
 from jaxtyping import Float64, Int64
 
+from stylesim.datasets.accounting import row_counts
 from stylesim.datasets.consistency import refuse_other_units
 from stylesim.datasets.dense import MAX_LOST_SHARE
 from stylesim.datasets.motion import backward_velocity, courses
-from stylesim.datasets.plausible import MAX_DISTANCE_M, MAX_LENGTH_M, MAX_SPEED_MPS, MAX_WIDTH_M
+from stylesim.datasets.plausible import MAX_DISTANCE_M, MAX_LENGTH_M, MAX_SPEED_MPS, MAX_WIDTH_M, MIN_SIDE_M
 from stylesim.datasets.recording import NEVER, Recording, SignalLog
 from stylesim.datasets.sizes import completed
 from stylesim.errors import InputError
@@ -24,6 +26,7 @@ from stylesim.geometry import wrap_angle
 from stylesim.tracks import MOTOR_KINDS, AgentKind
 
 MAX_FRAME = 100_000_000  # chosen: 46 days at 25 Hz; a larger number is damaged
+ORIGIN_ROWS = 50  # chosen: so many first rows outvote a few damaged ones
 MAX_ANGLE_RAD = 1e4  # chosen: beyond it an angle is a damaged number
 _MOTOR = [int(kind) for kind in MOTOR_KINDS]
 
@@ -66,12 +69,13 @@ def recording_of(
     once = table.unique(["agent", "frame"], keep="first", maintain_order=True).sort("agent", "frame")
     dropped["duplicate"] = dropped.get("duplicate", 0) + table.height - once.height
     recording = _derived(once, source, signals, dropped, front=front)
+    row_counts(rows_out=len(recording.frame), dropped=dropped, rows_in=before + sum(source.dropped.values()))
     refuse_other_units(recording, source.file)
     return recording, origin
 
 
 def _standard(table: pl.DataFrame) -> pl.DataFrame:
-    missing = [name for name in ("vx", "vy", "heading", "length", "width") if name not in table.columns]
+    missing = [name for name in ("vx", "vy", "speed", "heading", "length", "width") if name not in table.columns]
     table = table.with_columns(pl.lit(None, pl.Float64).alias(name) for name in missing)
     if "kind" not in table.columns:
         table = table.with_columns(kind=pl.lit(int(AgentKind.CAR), pl.Int8))
@@ -81,7 +85,7 @@ def _standard(table: pl.DataFrame) -> pl.DataFrame:
 def _readable(table: pl.DataFrame) -> pl.Expr:
     optional = [
         pl.col(name).is_finite().fill_null(False)
-        for name in ("vx", "vy", "heading")
+        for name in ("vx", "vy", "speed", "heading")
         if table[name].null_count() < table.height
     ]
     places = [pl.col(name).is_finite().fill_null(False) for name in ("x", "y")]
@@ -94,9 +98,10 @@ def _readable(table: pl.DataFrame) -> pl.Expr:
 def _plausible(table: pl.DataFrame, origin_m: Float64[np.ndarray, " 2"]) -> pl.Expr:
     near = [(pl.col(name) - o).abs() <= MAX_DISTANCE_M for name, o in zip(("x", "y"), origin_m.tolist(), strict=True)]
     speed = (pl.col("vx").pow(2) + pl.col("vy").pow(2)).fill_null(0.0) <= MAX_SPEED_MPS**2
-    # 0 stands for "not known" in several formats (inD: people and bicycles); below 0 is damaged.
+    speed &= pl.col("speed").fill_null(0.0).abs() <= MAX_SPEED_MPS
+    # 0 stands for "not known" in several formats (inD: people and bicycles).
     sized = [
-        pl.col(name).fill_null(0.0).is_between(0.0, most)
+        (pl.col(name).fill_null(0.0) == 0.0) | pl.col(name).is_between(MIN_SIDE_M, most)
         for name, most in (("length", MAX_LENGTH_M), ("width", MAX_WIDTH_M))
     ]
     return pl.all_horizontal(*near, speed, *sized, pl.col("frame").is_between(0, MAX_FRAME))
@@ -109,8 +114,8 @@ def _kept(table: pl.DataFrame, condition: pl.Expr, reason: str, dropped: dict[st
 
 
 def _origin(table: pl.DataFrame) -> Float64[np.ndarray, " 2"]:
-    """Near the road users of the first frame: what comes later moves nothing."""
-    first = table.filter(pl.col("frame") == pl.col("frame").min())
+    """Near the first road users: what comes later moves nothing."""
+    first = table.sort("frame", maintain_order=True).head(ORIGIN_ROWS)
     return np.asarray(np.round(np.median(first.select("x", "y").to_numpy(), axis=0), -2)) + 0.0  # no -0.0
 
 
@@ -168,9 +173,14 @@ def _motion(
     velocity = table.select("vx", "vy").to_numpy().astype(np.float64)
     heading = table["heading"].to_numpy().astype(np.float64)
     ahead = np.zeros(len(agent), np.int64)
-    if not np.isfinite(velocity).any():
+    speed = table["speed"].to_numpy().astype(np.float64)
+    along = not np.isfinite(velocity).any() and np.isfinite(speed).any()
+    if not along and not np.isfinite(velocity).any():
         velocity, ahead = backward_velocity(agent, frame, position, dt_s)
     if not np.isfinite(heading).any():
         heading, later = courses(agent, frame, position)
         ahead = np.maximum(ahead, np.where(np.isfinite(heading), later, 0))
+    if along:  # what never moves has no heading, and a speed of nothing but noise
+        direction = np.stack([np.cos(heading), np.sin(heading)], axis=1)
+        velocity = np.where(np.isfinite(heading)[:, None], speed[:, None] * direction, 0.0)
     return velocity, heading, ahead

@@ -10,6 +10,7 @@ import pytest
 
 from stylesim.labelers.base import Labeler
 from stylesim.labelers.kdsc import KDSC
+from stylesim.labelers.mdsi import MDSI
 from stylesim.labelers.tdbm import TDBM
 from stylesim.labels import UNDETERMINED
 
@@ -95,3 +96,9 @@ class TestTransposedTDBM(LabelerContract):
 class TestKDSC(LabelerContract):
     def make(self) -> Labeler:
         return KDSC()
+
+
+class TestMDSI(LabelerContract):
+    def make(self) -> Labeler:
+        rng = np.random.default_rng(7)
+        return MDSI(answers={f"car-{i}": rng.integers(1, 7, 44).tolist() for i in range(12)})

@@ -14,6 +14,8 @@ from stylesim.datasets.maps.projection import Projector
 from stylesim.datasets.maps.xml import parse
 from stylesim.errors import InputError
 
+MAX_COORDINATE_M = 5e7  # of any projection of a place on Earth
+
 
 @dataclass(frozen=True, eq=False)
 class Way:
@@ -80,9 +82,10 @@ def _places(root: Element, projector: Projector) -> dict[str, Float64[np.ndarray
         lon = np.array([float(n.get("lon", "nan")) for n in nodes])
         if not (np.abs(lat) <= 90).all() or not (np.abs(lon) <= 180).all():
             raise ValueError("a node's latitude or longitude is missing or no place on Earth")
-        xy = projector(lat, lon)
-    if not np.isfinite(xy).all():
-        raise ValueError("a node has no finite place")
+        with np.errstate(all="ignore"):  # the pole lies at infinity
+            xy = projector(lat, lon)
+    if not (np.abs(xy) <= MAX_COORDINATE_M).all():
+        raise ValueError("a node has no place, or one that is farther away than the Earth is round")
     return {n.get("id", ""): place for n, place in zip(nodes, xy, strict=True)}
 
 

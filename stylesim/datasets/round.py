@@ -1,0 +1,24 @@
+"""rounD: roundabouts in Germany by drone; see `levelx`."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from pathlib import Path
+
+from stylesim.datasets.cutting import SCENE_S
+from stylesim.datasets.levelx import COLUMNS, LANE_COLUMNS, recording_scenes
+from stylesim.datasets.levelx_tables import ROUND, first_classes, first_columns
+from stylesim.scene import Scene
+
+SOURCE = "round"
+
+
+def scenes(path: str | Path, *, scene_s: float = SCENE_S, map: str = "") -> Iterator[Scene]:
+    """The scenes of every recording in the data folder, by number; see `levelx.recording_scenes`."""
+    yield from recording_scenes(SOURCE, "rounD", Path(path), scene_s=scene_s, map=map)
+
+
+def sniff(path: Path) -> bool:
+    """True for tracks in levelXData's columns with classes that inD does not tell apart (van, trailer, bus, …)."""
+    columns = first_columns(path)
+    return set(COLUMNS) <= columns and not set(LANE_COLUMNS) & columns and bool(first_classes(path) & ROUND)
