@@ -79,6 +79,9 @@ def generate(
         None, metavar="start", help="The same, but the driver has the other style from its insertion on: 'start'."
     ),
     twin_style: str = typer.Option("", help="The class that the twin's driver gets.", show_default="drawn"),
+    ego: str = typer.Option(
+        "", metavar="pkg.module:planner", help="Your own planner drives one vehicle of each episode (docs/planners.md)."
+    ),
     twin_null: bool = typer.Option(True, help="And a second twin: the same driver and style with other noise."),
     stressor: str = typer.Option(
         "",
@@ -93,7 +96,7 @@ def generate(
     if calibration is not None:
         crowd = crowd.calibrated(calibration)
     twins = wanted_twins(twins_at, twins_from, twin_style, null=twin_null)
-    plan = EpisodePlan(stressors=stressors_of(stressor) if stressor else ())
+    plan = EpisodePlan(stressors=stressors_of(stressor) if stressor else (), ego=ego)
     with progress_bar("generating", "episodes") as progress:
         corpus = run(
             scenario,

@@ -18,6 +18,7 @@ from stylesim.randomness import stream
 from stylesim.scenario import Scenario
 from stylesim.simulation.highway.lanes import road_of
 from stylesim.simulation.highway.layouts import traffic_of
+from stylesim.simulation.highway.planned import ahead_m
 from stylesim.simulation.highway.spec import options_of
 from stylesim.simulation.highway.traffic import Crew, Traffic
 from stylesim.simulation.highway.vehicle import StyledVehicle
@@ -61,7 +62,7 @@ class HighwayWorld:
         """Cars of the half with most road ahead become the egos', so that most of the traffic lies about and ahead."""
         road, count = self._road(), len(self._names)
         self._wait_for_traffic(count)
-        farthest_first = sorted(road.vehicles, key=lambda car: (-_ahead_m(car), car.driver_id))
+        farthest_first = sorted(road.vehicles, key=lambda car: (-ahead_m(car), car.driver_id))
         half = max(count, len(farthest_first) // 2)
         chosen = rng.choice(half, size=count, replace=False) if count > 1 else [int(rng.integers(half))]
         for name, number in zip(self._names, chosen, strict=True):
@@ -176,13 +177,6 @@ class _CrewWithEgo(Crew):
     def hire(self, vehicle: StyledVehicle, *, limit_mps: float | None = None) -> None:
         if not isinstance(vehicle, EgoVehicle):
             super().hire(vehicle, limit_mps=limit_mps)
-
-
-def _ahead_m(car: StyledVehicle) -> float:
-    """Road left to the car: the rest of its lane, and what follows on its route."""
-    rest = float(car.lane.length - car.lane.local_coordinates(car.position)[0])
-    legs = [leg for leg in car.route or () if leg[:2] != car.lane_index[:2]]
-    return rest + sum(car.road.network.get_lane((*leg[:2], leg[2] or 0)).length for leg in legs)
 
 
 def _pose(car: StyledVehicle) -> Float64[np.ndarray, " 7"]:

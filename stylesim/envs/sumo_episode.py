@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from stylesim.envs.config import EnvConfig
-from stylesim.envs.sumo_crowd import SumoCrowd, poses_of
+from stylesim.envs.sumo_crowd import SumoCrowd
 from stylesim.envs.sumo_ego import SumoEgo
 from stylesim.envs.sumo_entry import EGO, ego_names, insert_egos
 from stylesim.envs.world import LEAVES, NO_DECISION, EgoCommand, Picture, Snapshot
@@ -17,6 +17,7 @@ from stylesim.population import Population
 from stylesim.randomness import stream
 from stylesim.scenario import Scenario
 from stylesim.simulation.sumo.engine import Engine
+from stylesim.simulation.sumo.live import poses_of
 from stylesim.simulation.sumo.takeover import LENGTH_M, WIDTH_M
 
 COAST = EgoCommand(0.0, float("nan"), 0)

@@ -15,6 +15,7 @@ from typing import Any
 from stylesim.corpus import Corpus, CorpusWriter
 from stylesim.corpus.files import new_folder, sha256_of, storage_error
 from stylesim.errors import InputError, SimulationError
+from stylesim.planners.loading import planner_source
 from stylesim.population import Population
 from stylesim.resources import agents_dir
 from stylesim.scenario import Scenario, load_scenario
@@ -168,6 +169,7 @@ def configuration(job: Job, episodes: int) -> dict[str, Any]:
     return {
         "episodes": episodes,
         "plan": job.plan.model_dump(mode="json"),
+        "planner_sha256": _planner(job.plan.ego),
         "twins": None if job.twins is None else job.twins.model_dump(mode="json"),
         "population": _population(job.population),
         "scenarios": [
@@ -182,6 +184,12 @@ def configuration(job: Job, episodes: int) -> dict[str, Any]:
             if (path := calibration_file(backend)) is not None and not job.population.calibration
         },
     }
+
+
+def _planner(entry_point: str) -> str:
+    """sha256 of the planner's module, so that a changed planner is another request; "" without one."""
+    source = planner_source(entry_point) if entry_point else None
+    return sha256_of(source) if source is not None else ""
 
 
 def _population(population: Population) -> dict[str, Any]:

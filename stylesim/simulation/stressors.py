@@ -123,6 +123,11 @@ class Walker:
     begin_s: float  # of the log
     end_s: float
 
+    @property
+    def velocity_mps(self) -> tuple[float, float]:
+        """While it walks."""
+        return self.speed_mps * math.cos(self.heading_rad), self.speed_mps * math.sin(self.heading_rad)
+
     def position_m(self, time_s: float) -> tuple[float, float]:
         """Where it is then."""
         way = self.speed_mps * (time_s - self.begin_s)

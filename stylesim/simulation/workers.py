@@ -22,6 +22,7 @@ from typing import Any, NamedTuple, Protocol, runtime_checkable
 
 from stylesim.corpus import write_part
 from stylesim.corpus.files import storage_error
+from stylesim.planners.loading import load_planner
 from stylesim.population import Population
 from stylesim.scenario import Scenario
 from stylesim.scene import Scene
@@ -99,6 +100,8 @@ class EpisodeRunner:
 
     def __init__(self, job: Job) -> None:
         self._job = job
+        if job.plan.ego:
+            load_planner(job.plan.ego)  # here, so that a wrong one is said before the first episode
         self._backends: dict[str, Backend] = {
             name: open_backend(name) for name in sorted({scenario.backend for scenario in job.scenarios})
         }

@@ -12,6 +12,7 @@ from stylesim.scene import Scene
 from stylesim.simulation.highway.lanes import road_of
 from stylesim.simulation.highway.layouts import traffic_of
 from stylesim.simulation.highway.log import TrackLog
+from stylesim.simulation.highway.planned import PlannedEgo
 from stylesim.simulation.highway.spec import LOG_HZ, options_of
 from stylesim.simulation.highway.traffic import Crew, Traffic
 from stylesim.simulation.plan import PLAIN, EpisodePlan
@@ -52,8 +53,13 @@ class HighwayBackend:
             traffic.advance()
         early = len(traffic.removed)
         traffic.start_log()
+        ego = PlannedEgo(traffic, plan.ego, name=scenario.name, seed=seed, episode=episode) if plan.ego else None
         for frame in range(n_frames):
+            if ego is not None:
+                ego.before_frame()
             log.add(traffic.frame())
+            if ego is not None:
+                ego.after_frame()
             crew.after_frame(frame / LOG_HZ, traffic.road.vehicles)
             for _ in range(options.simulation_hz // LOG_HZ):
                 traffic.advance()
@@ -70,7 +76,7 @@ class HighwayBackend:
             counts=_counts(tracks, traffic, log, removed_before_log=early),
             parameters=drawn,
         )
-        return plan.applied_to(scene)
+        return plan.applied_to(scene if ego is None else ego.in_scene(scene))
 
     def close(self) -> None:
         """Nothing is held."""

@@ -41,8 +41,8 @@ class Crew:
         return stream(*self._key, driver_id, salted(purpose, new_noise=other))
 
     def hire(self, vehicle: StyledVehicle, *, limit_mps: float | None = None) -> None:
-        """Give the car its driver, unless it has one; the limit of its way, where that is not its lane's."""
-        if vehicle.style is not None:
+        """Give the car its driver, unless it has one or is an ego; the limit of its way, where its lane has another."""
+        if vehicle.style is not None or vehicle.driver_id:
             return
         driver_id = f"car-{self._hired:04d}"
         self._hired += 1

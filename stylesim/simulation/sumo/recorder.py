@@ -14,6 +14,7 @@ from jaxtyping import Float64, Int32
 
 from stylesim.simulation.sumo.engine import SumoApi
 
+EXTRA = "/"  # how the ids of vehicles begin that are no drivers: obstacles, which nobody logs
 FLUSH_STEPS = 400  # Python tuples of so many steps are held at most, to bound memory
 
 
@@ -83,6 +84,15 @@ class Recorder:
             self._here[name] = self._number[name]
         self._unseen.extend(names)
 
+    def take_out(self, name: str) -> None:
+        """A driver was taken off the road on purpose: its log ends, and that is no event."""
+        self._here.pop(name, None)
+        self._list_anew()
+
+    def _list_anew(self) -> None:
+        self._ids = list(self._here)
+        self._numbers = np.fromiter(self._here.values(), np.int32, len(self._here))
+
     def after_step(self, step: int) -> None:
         """Takes what the step brought."""
         self._follow_traffic(step)
@@ -104,7 +114,7 @@ class Recorder:
 
     def _follow_traffic(self, step: int) -> None:
         """Keeps the list of vehicles on the road; only steps with entries or exits cost more than three calls."""
-        departed = self._sumo.simulation.getDepartedIDList()
+        departed = [name for name in self._sumo.simulation.getDepartedIDList() if not name.startswith(EXTRA)]
         arrived = self._sumo.simulation.getArrivedIDList()
         self.take_in(departed, step)
         for name in arrived:
@@ -113,8 +123,7 @@ class Recorder:
         if gone:
             self._resynchronise(step)
         if departed or arrived or gone:
-            self._ids = list(self._here)
-            self._numbers = np.fromiter(self._here.values(), np.int32, len(self._here))
+            self._list_anew()
 
     def _resynchronise(self, step: int) -> None:
         """Vehicles that vanished without arriving, or came without departing (after a teleport)."""
@@ -129,6 +138,8 @@ class Recorder:
     def _follow_events(self, step: int) -> None:
         simulation, events = self._sumo.simulation, self._events
         for collision in simulation.getCollisions():
+            if collision.collider.startswith(EXTRA) or collision.victim.startswith(EXTRA):
+                continue  # whoever really touches a walker is found on the boxes
             events.collisions.append((step, collision.collider, collision.victim))
         events.emergency_stops.extend((step, name) for name in simulation.getEmergencyStoppingVehiclesIDList())
         events.teleports.extend((step, name) for name in simulation.getStartingTeleportIDList())

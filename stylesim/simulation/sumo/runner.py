@@ -13,6 +13,7 @@ from stylesim.simulation.stressors import check_possible, with_events
 from stylesim.simulation.sumo.engine import Engine
 from stylesim.simulation.sumo.episode import DT_S, EpisodeFiles, prepare_episode, sumo_options
 from stylesim.simulation.sumo.flow import FlowSense
+from stylesim.simulation.sumo.planned import PlannedEgo
 from stylesim.simulation.sumo.recorder import RawLog, Recorder
 from stylesim.simulation.sumo.scenes import scene_of
 from stylesim.simulation.sumo.stopzone import StopZone
@@ -46,11 +47,14 @@ class SumoBackend:
             files = prepare_episode(scenario, population, seed=seed, episode=episode, folder=Path(folder), plan=plan)
             check_possible(plan, files.network.road, scenario.name)
             stressing = Stressing(self._engine.sumo, files)
-            log, decisions = self.simulate(files, stressing)
-        scene = scene_of(log, decisions, files, name=scenario.name)
-        return plan.applied_to(with_events(scene, stressing.outcome(), plan))
+            ego = PlannedEgo(self._engine.sumo, files, plan.ego, name=scenario.name) if plan.ego else None
+            log, decisions = self.simulate(files, stressing, ego)
+        scene = with_events(scene_of(log, decisions, files, name=scenario.name), stressing.outcome(), plan)
+        return plan.applied_to(scene if ego is None else ego.in_scene(scene))
 
-    def simulate(self, files: EpisodeFiles, stressing: Stressing | None = None) -> tuple[RawLog, list[DecisionEvent]]:
+    def simulate(
+        self, files: EpisodeFiles, stressing: Stressing | None = None, ego: PlannedEgo | None = None
+    ) -> tuple[RawLog, list[DecisionEvent]]:
         """Steps through a prepared episode; what was logged and what was decided at yellow lights."""
         engine = self._engine
         engine.load(sumo_options(files))
@@ -65,8 +69,12 @@ class SumoBackend:
             zone.before_step(step)
             if stressing is not None:
                 stressing.before_step(step)
+            if ego is not None and (replaced := ego.before_step(step, () if stressing is None else stressing.walkers)):
+                recorder.take_out(replaced)
             engine.step()
             recorder.after_step(step)
+            if ego is not None:
+                ego.after_step(step)
         return recorder.finish(), yellow.events
 
     def close(self) -> None:

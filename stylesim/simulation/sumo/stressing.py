@@ -65,6 +65,11 @@ class Stressing:
                 self._waiting.remove(attempt)
         self._acts = [act for act in self._acts if act.step(now_s)]
 
+    @property
+    def walkers(self) -> tuple[Walker, ...]:
+        """Everybody who has set out so far."""
+        return tuple(self._walkers)
+
     def outcome(self) -> Outcome:
         """What came of it."""
         missed = (*self._missed, *(attempt.kind for attempt in self._waiting))

@@ -7,13 +7,13 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from stylesim.envs.sumo_crowd import poses_of, shifted
 from stylesim.envs.sumo_entry import widest_gap
-from stylesim.envs.sumo_wander import BLOCK, Wander
 from stylesim.population import Population
 from stylesim.randomness import stream
 from stylesim.scenario import load_scenario
 from stylesim.simulation.sumo.episode import prepare_episode
+from stylesim.simulation.sumo.live import poses_of, shifted
+from stylesim.simulation.sumo.live_wander import BLOCK, Wander
 from stylesim.simulation.wander import ROOM_BEYOND_LANE_M, lateral_wander
 
 

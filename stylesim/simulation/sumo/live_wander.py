@@ -8,7 +8,7 @@ import numpy as np
 from jaxtyping import Float64, Int64
 
 from stylesim.randomness import stream
-from stylesim.simulation.sumo.episode import DT_S, EpisodeFiles
+from stylesim.simulation.sumo.episode import DT_S, Episode
 from stylesim.simulation.sumo.vehicles import Driver
 from stylesim.simulation.wander import (
     FILTER_RAD_PER_S,
@@ -24,7 +24,7 @@ BLOCK = 1024  # draws taken from a driver's stream at once
 class Wander:
     """Every driver's place in its lane; the same target, filter, limits and streams as in a recorded episode."""
 
-    def __init__(self, files: EpisodeFiles) -> None:
+    def __init__(self, files: Episode) -> None:
         self._files = files
         self._drivers: Sequence[Driver] = tuple(files.drivers.values())
         narrowest = min(lane.width_m for lane in files.network.road.lanes)
