@@ -14,6 +14,7 @@ EASY_SHARE = 0.75  # a stop softer than this share of the wished deceleration is
 # at 5.6 s before the line (TRID 801675) must come out at 14 and at 20 m/s, for who wishes 2.8
 GAP_M = 1.0  # to the stop line in the end; chosen, because people stand 1 to 2 m before it
 LEAST_GAP_M = 0.3  # of who must brake hard; chosen, because it still stands before the line
+REACHED_M = 0.2  # so near its place who creeps stops, too
 STANDING_MPS = 0.05
 
 
@@ -51,13 +52,16 @@ class StopPlan:
         self.speed_mps = speed_mps
 
     def next_speed(self, speed_mps: float, dt_s: float) -> float | None:
-        """The speed to drive with in the next step; None as long as it has not begun to brake.
+        """The speed to drive with in the next step; None until the response is over, then no faster than now.
 
         Even braking over what is left, v^2 / 2d, is approached by the jerk limit; in the end the braking falls with
         the square root of the speed, which keeps the jerk at `END_JERK_MPS3`.
         """
-        if not self.braking and not self._begins(speed_mps, dt_s):
-            return None
+        if not self.braking:
+            if self.response_s > 0.5 * dt_s:
+                return None
+            if not self._begins(speed_mps):
+                return speed_mps
         if speed_mps <= STANDING_MPS:
             return 0.0
         even = speed_mps**2 / (2.0 * max(self.distance_m - self._gap_m, 0.05))
@@ -66,14 +70,12 @@ class StopPlan:
         self.acceleration_mps2 = min(max(wanted, self.acceleration_mps2 - change), self.acceleration_mps2 + change, 0.0)
         return max(0.0, speed_mps + self.acceleration_mps2 * dt_s)
 
-    def _begins(self, speed_mps: float, dt_s: float) -> bool:
-        """After the response, and once the stop needs as much braking as the driver likes."""
-        if self.response_s > 0.5 * dt_s:
-            return False
+    def _begins(self, speed_mps: float) -> bool:
+        """Once the stop needs as much braking as the driver likes, or its place is reached."""
         room = max(self.distance_m - GAP_M, 0.05)
         need = speed_mps**2 / (2.0 * room)
         need = speed_mps**2 / (2.0 * max(room - lost_m(speed_mps, min(need, self.hardest_mps2)), 0.05))
-        if need < EASY_SHARE * self.wish_mps2:
+        if need < EASY_SHARE * self.wish_mps2 and self.distance_m > GAP_M + REACHED_M:
             return False
         self.braking = True
         if need > HARD_MPS2:

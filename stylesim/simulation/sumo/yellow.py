@@ -58,7 +58,7 @@ class _Approach:
     distance_m: float
     plan: StopPlan | None  # None: it goes
     holds: bool = False  # it stands, and SUMO holds it
-    mode: int = 0  # SUMO's speed mode before it began to brake
+    mode: int | None = None  # SUMO's speed mode before its speed was set here; None while SUMO chooses it
 
 
 class YellowController:
@@ -109,20 +109,23 @@ class YellowController:
                 self._release(driver_id)
 
     def _brake(self, driver_id: str, way: _Approach, plan: StopPlan, speed_mps: float) -> None:
-        vehicle, began = self._sumo.vehicle, plan.braking
         speed = plan.next_speed(speed_mps, DT_S)
-        if speed is None:
-            return
         if speed_mps <= STANDING_MPS:
-            vehicle.setSpeed(driver_id, SUMO_DRIVES)
-            vehicle.setSpeedMode(driver_id, way.mode)
+            self._give_back(driver_id, way)
             way.holds = True
             self._tell(driver_id, way)
-            return
-        if not began:
-            way.mode = vehicle.getSpeedMode(driver_id)
-            vehicle.setSpeedMode(driver_id, way.mode & ~BRAKING_BOUND)
-        vehicle.setSpeed(driver_id, speed)
+        elif speed is not None:
+            if way.mode is None:
+                way.mode = self._sumo.vehicle.getSpeedMode(driver_id)
+                self._sumo.vehicle.setSpeedMode(driver_id, way.mode & ~BRAKING_BOUND)
+            self._sumo.vehicle.setSpeed(driver_id, speed)
+
+    def _give_back(self, driver_id: str, way: _Approach) -> None:
+        """SUMO chooses the driver's speed again."""
+        if way.mode is not None:
+            self._sumo.vehicle.setSpeed(driver_id, SUMO_DRIVES)
+            self._sumo.vehicle.setSpeedMode(driver_id, way.mode)
+            way.mode = None
 
     def _ask(self, onsets: set[tuple[str, int]], step: int) -> None:
         """Everybody whose next yellow light is one of `onsets` decides; an ego of somebody else decides for itself."""
@@ -186,9 +189,7 @@ class YellowController:
         way = self._under_way.pop(driver_id, None)
         if way is None:
             return
-        if way.plan is not None and way.plan.braking and not way.holds:
-            self._sumo.vehicle.setSpeed(driver_id, SUMO_DRIVES)
-            self._sumo.vehicle.setSpeedMode(driver_id, way.mode)
+        self._give_back(driver_id, way)
         self._tell(driver_id, None)
 
 

@@ -74,3 +74,11 @@ def test_too_late_is_negative() -> None:
     assert latest_response_s(speed_mps=20.0, distance_m=20.0, deceleration_mps2=7.5) < 0.0
     assert latest_response_s(speed_mps=20.0, distance_m=200.0, deceleration_mps2=7.5) > 7.0
     assert math.isfinite(latest_response_s(speed_mps=0.1, distance_m=1.0, deceleration_mps2=7.5))
+
+
+@pytest.mark.parametrize(("speed", "distance"), [(0.2, 3.0), (1.0, 8.0), (5.0, 60.0)])
+def test_who_creeps_does_not_speed_up_and_stands_before_the_line(speed: float, distance: float) -> None:
+    speeds, plan = driven(speed, distance, 0.5, 3.0)
+    assert (np.diff(speeds) <= 1e-9).all()
+    assert speeds[-1] == 0.0
+    assert plan.distance_m > 0.0
