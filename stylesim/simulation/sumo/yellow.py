@@ -30,7 +30,9 @@ OFF, ALWAYS = "-1", "1000"
 AT_ONSET = f"{ONSET_S:.2f}"
 HORIZON_M = 250.0  # who is farther away at the onset of yellow does not decide; at 20 m/s that is 12 s
 OVER_M = 0.5  # beyond the line; SUMO's light is behind it then
-BRAKING_BOUND = 0b00100  # of SUMO's speed mode: no harder than the type's `decel`
+# What SUMO's speed mode is without: braking no harder than the type's `decel`, and braking for who crosses on green,
+# because it does not know that the driver will stop
+WHILE_STOPPING = ~0b01100
 SUMO_DRIVES = -1.0
 
 
@@ -115,10 +117,12 @@ class YellowController:
             way.holds = True
             self._tell(driver_id, way)
         elif speed is not None:
-            if way.mode is None:
-                way.mode = self._sumo.vehicle.getSpeedMode(driver_id)
-                self._sumo.vehicle.setSpeedMode(driver_id, way.mode & ~BRAKING_BOUND)
             self._sumo.vehicle.setSpeed(driver_id, speed)
+
+    def _take(self, driver_id: str, way: _Approach) -> None:
+        """Its stop is planned here; SUMO minds the others on its lane."""
+        way.mode = self._sumo.vehicle.getSpeedMode(driver_id)
+        self._sumo.vehicle.setSpeedMode(driver_id, way.mode & WHILE_STOPPING)
 
     def _give_back(self, driver_id: str, way: _Approach) -> None:
         """SUMO chooses the driver's speed again."""
@@ -149,6 +153,8 @@ class YellowController:
         plan = _plan(decision, distance_m, speed) if decision.stop else None
         self._under_way[driver_id] = _Approach(*link, number, len(self.events), distance_m, plan)
         self._tell(driver_id, self._under_way[driver_id])
+        if plan is not None:
+            self._take(driver_id, self._under_way[driver_id])
         self.events.append(
             DecisionEvent(step, driver_id, decision.stop, speed, distance_m, impossible=decision.impossible)
         )
@@ -177,6 +183,7 @@ class YellowController:
                 rng = self._files.stream(driver_id, f"gives up {way.number}", step=step)
                 wish = wished_deceleration(style, rng)
                 way.plan = StopPlan(way.distance_m, 0.0, wish, EMERGENCY_MPS2, speed_mps=speed)
+                self._take(driver_id, way)
                 self.events[way.event] = replace(self.events[way.event], gave_up=True)
 
     def _turned_green(self, signal: str, shown: str) -> None:
