@@ -40,6 +40,7 @@ _HOME = {
     "label": "stylesim.labelers.labelling",
     "load_forecaster": "stylesim.forecasting.checkpoint",
     "merge": "stylesim.merging.merge",
+    "own_network": "stylesim.simulation.sumo.own",
     "populate": "stylesim.plugins.populate",
     "read": "stylesim.datasets.reading",
     "realism": "stylesim.evaluation.realism",

@@ -57,8 +57,28 @@ def wanted_twins(at_s: float | None, start: str | None, style: str, *, null: boo
     return TwinRequest(at_s=at_s, style=style, null=null)
 
 
+def wanted_scenarios(names: list[str], net: Path | None, demand: Path | None, vph: float | None) -> list[str]:
+    """The scenarios that were named, and the one of the user's own network. InputError for options without it."""
+    if net is None:
+        if demand is not None or vph is not None:
+            raise InputError("--demand and --vph say what drives in your own network; give it with --net")
+        return names
+    from stylesim.simulation.sumo.own import own_network
+
+    return [*names, str(own_network(net, demand=demand, vph=vph))]
+
+
 def generate(
-    scenario: list[str] = typer.Argument(help="Scenarios by name (see `stylesim list scenarios`) or by folder."),
+    scenario: list[str] | None = typer.Argument(
+        None, help="Scenarios by name (see `stylesim list scenarios`) or by folder."
+    ),
+    net: Path | None = typer.Option(
+        None, help="Your own network: SUMO (.net.xml), OpenStreetMap (.osm) or OpenDRIVE (.xodr)."
+    ),
+    demand: Path | None = typer.Option(None, help="With --net: a SUMO route file whose vehicles get styled drivers."),
+    vph: float | None = typer.Option(
+        None, help="With --net: vehicles/h over all entries.", show_default="300 for each lane that enters"
+    ),
     out: Path = typer.Option(..., "--out", help="Folder of the new corpus; must not exist."),
     population: str | None = typer.Option(
         None, help="A population's name (see `stylesim list populations`) or YAML file.", show_default="tdbm_spectrum"
@@ -97,9 +117,10 @@ def generate(
         crowd = crowd.calibrated(calibration)
     twins = wanted_twins(twins_at, twins_from, twin_style, null=twin_null)
     plan = EpisodePlan(stressors=stressors_of(stressor) if stressor else (), ego=ego)
+    names = wanted_scenarios(scenario or [], net, demand, vph)
     with progress_bar("generating", "episodes") as progress:
         corpus = run(
-            scenario,
+            names,
             crowd,
             episodes=episodes,
             seed=seed,
@@ -111,8 +132,8 @@ def generate(
             progress=progress,
         )
     counts = corpus.manifest["counts"]
-    names = ("neutral",) if crowd.within_class == "neutral" else STYLE_CLASSES
-    drivers = {name: counts.get(f"drivers.{name}", 0) for name in names}
+    styles_asked = ("neutral",) if crowd.within_class == "neutral" else STYLE_CLASSES
+    drivers = {name: counts.get(f"drivers.{name}", 0) for name in styles_asked}
     total = max(1, sum(drivers.values()))
     asked = crowd.by_class | {"neutral": 1.0}
     rows = [(name, n, f"{n / total:.3f}", f"{asked[name]:.3f}") for name, n in drivers.items()]

@@ -11,8 +11,8 @@ import numpy as np
 from jaxtyping import Float64
 
 from stylesim.datasets.maps.projection import Projector
-from stylesim.datasets.maps.xml import parse
 from stylesim.errors import InputError
+from stylesim.xmlfiles import parse
 
 MAX_COORDINATE_M = 5e7  # of any projection of a place on Earth
 

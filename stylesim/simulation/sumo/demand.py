@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 
@@ -30,6 +30,7 @@ class Arrivals:
     episode: int
     until_s: float
     parameters: Mapping[str, float]
+    limits_mps: Mapping[str, float] = field(default_factory=dict)  # of the edges, where no limit is drawn
 
 
 def _departures(flow: Flow, arrivals: Arrivals) -> Iterator[float]:
@@ -53,7 +54,7 @@ def drawn_driver(flow: Flow, number: int, depart_s: float, population: Populatio
     body = stream(seed, episode, name, "body")
     truck = bool(body.random() < arrivals.parameters["truck_share"]) and flow.trucks
     kind, length, width = draw_body(truck=truck, rng=body)
-    limit = arrivals.parameters.get("speed_limit_mps")
+    limit = arrivals.parameters.get("speed_limit_mps", arrivals.limits_mps.get(flow.enter))
     style = population.draw(stream(seed, episode, name, "style"), backend="sumo", limit_mps=limit)
     return Driver(name, style, kind, length, width, depart_s, f"{flow.enter} {way}".strip())
 

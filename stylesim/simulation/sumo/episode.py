@@ -15,12 +15,14 @@ from stylesim.scenario import Scenario
 from stylesim.simulation.driving import HARDEST_BRAKING_MPS2
 from stylesim.simulation.plan import PLAIN, EpisodePlan, Twin, salted
 from stylesim.simulation.sumo.demand import Arrivals, check_routes, draw_drivers, routes_xml
+from stylesim.simulation.sumo.demanded import demanded_drivers
 from stylesim.simulation.sumo.dilemma import dilemma_drivers
 from stylesim.simulation.sumo.network import compiled_network
 from stylesim.simulation.sumo.options import SumoOptions, sumo_options_of
 from stylesim.simulation.sumo.roads import RoadNetwork, read_network
 from stylesim.simulation.sumo.signals import Programme, programme_of, programmes_xml
 from stylesim.simulation.sumo.vehicles import Driver
+from stylesim.simulation.sumo.ways import WayFinder, generated_demand
 
 DT_S = 0.1
 TWIN_TYPE = "/twin"  # what the id of a driver's second vehicle type ends in
@@ -84,13 +86,21 @@ def prepare_episode(
     """
     options = sumo_options_of(scenario)
     parameters = scenario.draw(stream(seed, episode, "", "scenario"))
-    path = compiled_network(scenario, options, speed_limit_mps=parameters["speed_limit_mps"])
+    if options.own is None:
+        path = compiled_network(scenario, options, speed_limit_mps=parameters["speed_limit_mps"])
+    else:
+        path = scenario.folder / options.own.net
+        if not options.flows and not options.own.demand:
+            options = options.model_copy(update={"flows": generated_demand(path).flows})
     network = read_network(path)
     check_routes(options, network, name=scenario.name)
     programmes = _programmes(options, network, parameters, seed=seed, episode=episode)
     until_s = scenario.warm_up_s + scenario.duration_s * options.last_entry_share
-    arrivals = Arrivals(seed, episode, until_s, parameters)
+    limits = {} if options.own is None else WayFinder(network).limit_mps
+    arrivals = Arrivals(seed, episode, until_s, parameters, limits)
     drivers = draw_drivers(options, population, arrivals)
+    if options.own is not None and options.own.demand:
+        drivers += demanded_drivers(scenario.folder / options.own.demand, network, population, arrivals)
     drivers += dilemma_drivers(options, network, programmes, population, arrivals)
     drivers = tuple(sorted(drivers, key=lambda driver: (driver.depart_s, driver.driver_id)))
     routes = folder / "routes.rou.xml"

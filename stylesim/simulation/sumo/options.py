@@ -11,7 +11,8 @@ from stylesim.errors import InputError, unknown
 from stylesim.scenario import Scenario
 from stylesim.specs import Spec, parse
 
-PARAMETERS = ("speed_limit_mps", "truck_share")
+PARAMETERS = ("truck_share",)
+LIMIT_PARAMETERS = ("speed_limit_mps",)  # of networks that are compiled for each episode
 DEMAND_PARAMETERS = ("demand_vph",)
 SIGNAL_PARAMETERS = ("cycle_s", "first_green_share", "yellow_s", "all_red_s")
 OPTIONAL_PARAMETERS = ("wet_road",)  # 1: drivers decide at a yellow as on a wet road
@@ -23,6 +24,16 @@ class NetworkFiles(Spec):
     nodes: str
     edges: str
     connections: str
+
+
+class OwnNetwork(Spec):
+    """A network of the user's, beside scenario.yaml; what was given is known by its sha256 (`own`)."""
+
+    net: str
+    kind: str
+    sha256: str
+    demand: str = ""  # a route file; without one the flows, or generated ones
+    demand_sha256: str = ""
 
 
 class EdgeType(Spec):
@@ -85,9 +96,10 @@ class SignalPlan(Spec):
 class SumoOptions(Spec):
     """The whole of `options`."""
 
-    network: NetworkFiles
-    edge_types: dict[str, EdgeType]
-    flows: tuple[Flow, ...] = Field(min_length=1)
+    network: NetworkFiles | None = None
+    own: OwnNetwork | None = None
+    edge_types: dict[str, EdgeType] = Field(default_factory=dict)
+    flows: tuple[Flow, ...] = ()  # of an own network without demand: generated if there are none
     signals: tuple[SignalPlan, ...] = ()
     last_entry_share: float = Field(
         default=1.0, gt=0, le=1
@@ -96,12 +108,18 @@ class SumoOptions(Spec):
     @property
     def has_demand(self) -> bool:
         """Whether any flow is a share of the demand."""
+        if self.own is not None and not self.flows:
+            return not self.own.demand
         return any(flow.onset_tts_s is None for flow in self.flows)
 
     @model_validator(mode="after")
     def _shares(self) -> SumoOptions:
+        if (self.network is None) == (self.own is None):
+            raise ValueError("give either network or own")
+        if self.own is None and not self.flows:
+            raise ValueError("flows: give at least one")
         total = sum(flow.share for flow in self.flows)
-        if self.has_demand and abs(total - 1.0) > 1e-6:
+        if self.flows and self.has_demand and abs(total - 1.0) > 1e-6:
             raise ValueError(f"the shares of the flows sum to {total:.6g}, not 1")
         if len({flow.name for flow in self.flows}) != len(self.flows):
             raise ValueError("two flows have the same name")
@@ -115,6 +133,7 @@ def sumo_options_of(scenario: Scenario) -> SumoOptions:
     where = scenario.folder / "scenario.yaml"
     options = parse(SumoOptions, scenario.options, f"{where}: options")
     wanted = PARAMETERS + (DEMAND_PARAMETERS if options.has_demand else ())
+    wanted += LIMIT_PARAMETERS if options.own is None else ()
     wanted += SIGNAL_PARAMETERS if options.signals else ()
     for name in scenario.parameters:
         if name not in wanted + OPTIONAL_PARAMETERS:
@@ -126,7 +145,9 @@ def sumo_options_of(scenario: Scenario) -> SumoOptions:
 
 
 def source_files(scenario: Scenario, options: SumoOptions) -> dict[str, Path]:
-    """The network's source files by kind; InputError if one is missing."""
+    """The network's source files by kind (none of an own network); InputError if one is missing."""
+    if options.network is None:
+        return {}
     files = {kind: scenario.folder / name for kind, name in options.network.model_dump().items()}
     for kind, path in files.items():
         if not path.is_file():

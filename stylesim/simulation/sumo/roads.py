@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import xml.etree.ElementTree as ET
 from collections import Counter, defaultdict
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 from functools import lru_cache
 from pathlib import Path
 
@@ -33,6 +34,7 @@ class RoadNetwork:
     links: tuple[SignalLink, ...]
     length_m: dict[str, float]  # of each lane, as SUMO counts it
     edges: tuple[str, ...]  # those between junctions
+    ends: Mapping[str, tuple[str, str]] = field(default_factory=dict)  # of those: the nodes from which and to which
 
     def signals(self) -> tuple[str, ...]:
         """The ids of its signals, sorted."""
@@ -60,7 +62,7 @@ def _stop_line(shape: Float64[np.ndarray, "point 2"], width_m: float) -> Float64
 def read_network(path: Path) -> RoadNetwork:
     """The network at `path` (a net of this package's compiling; lanes inside junctions are included)."""
     root = ET.parse(path).getroot()
-    edges = [e for e in root.findall("edge") if e.get("function", "normal") in ("normal", "internal")]
+    edges = [e for e in root.findall("edge") if e.get("function", "normal") in ("normal", "internal", "connector")]
     successors: dict[str, list[str]] = defaultdict(list)
     links: list[SignalLink] = []
     for item in root.findall("connection"):
@@ -76,9 +78,18 @@ def read_network(path: Path) -> RoadNetwork:
     crossings = _crossings(edges)
     lanes = [lane for edge in edges for lane in _lanes(edge, successors, controlled, crossings)]
     outer = tuple(e.attrib["id"] for e in edges if e.get("function") != "internal")
+    ends = {
+        e.attrib["id"]: (e.attrib["from"], e.attrib["to"]) for e in edges if "from" in e.attrib and "to" in e.attrib
+    }
     length = {lane.attrib["id"]: float(lane.attrib["length"]) for edge in edges for lane in edge.findall("lane")}
     ordered = tuple(sorted(links, key=lambda link: (link.signal, link.index)))
-    return RoadNetwork(Road(tuple(lanes)), ordered, length, outer)
+    return RoadNetwork(Road(tuple(lanes)), ordered, length, outer, ends)
+
+
+def _for_cars(lane: ET.Element) -> bool:
+    """Whether passenger cars may use it (no sidewalk, bus lane or railway)."""
+    allowed, barred = lane.get("allow"), (lane.get("disallow") or "").split()
+    return ("passenger" in allowed.split() or allowed == "all") if allowed else not {"passenger", "all"} & set(barred)
 
 
 def _crossings(edges: list[ET.Element]) -> set[str]:
@@ -92,8 +103,8 @@ def _crossings(edges: list[ET.Element]) -> set[str]:
 
 
 def _lanes(edge: ET.Element, successors: dict[str, list[str]], controlled: set[str], crossings: set[str]) -> list[Lane]:
-    """The lanes of one edge, right to left; lanes too short to have a direction are left out."""
-    elements = edge.findall("lane")
+    """The lanes of one edge for cars, right to left; lanes too short to have a direction are left out."""
+    elements = [element for element in edge.findall("lane") if _for_cars(element)]
     ids = [element.attrib["id"] for element in elements]
     internal = edge.get("function") == "internal"
     crossing = internal and edge.attrib["id"].removeprefix(":").rsplit("_", 1)[0] in crossings

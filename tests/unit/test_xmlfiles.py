@@ -2,7 +2,7 @@ import gzip
 
 import pytest
 
-from stylesim.datasets.maps import xml
+from stylesim import xmlfiles as xml
 from stylesim.errors import InputError
 
 BOMB = """<?xml version="1.0"?>
