@@ -18,7 +18,7 @@ from stylesim.evaluation.fidelity_agreement import measured_windows as own_windo
 from stylesim.evaluation.fidelity_ranges import FeatureRanges, ranges_of
 from stylesim.evaluation.fidelity_robustness import Variant, robustness
 from stylesim.evaluation.fidelity_targets import HELD_TO_TARGET
-from stylesim.evaluation.scaler_guard import check_unseen
+from stylesim.evaluation.scaler_guard import check_not_calibrated_on, check_unseen
 from stylesim.labelers.kdsc import KDSC
 from stylesim.labelers.reference import DEFAULT_REFERENCE, default_labeler, scalers_dir
 from stylesim.labelers.tdbm import TDBM
@@ -94,11 +94,13 @@ def fidelity(
     `scenarios`: only these; () is all. `seed`, `draws`: of the bootstrap of the intervals. `progress` is called with a
     stage, the scenes done and their number. No file is written.
 
-    InputError if the corpus (or its seed) is in a labeller's provenance, or holds no driver that can be judged.
+    InputError if the corpus (or its seed) is in a labeller's provenance, its seed in that of the shipped calibrated
+    styles, or it holds no driver that can be judged.
     """
     shipped = _shipped()
     for (method, reference), labeler in shipped.items():
         check_unseen(corpus, labeler.provenance_, what=f"{reference} ({method})")
+    check_not_calibrated_on(corpus)
     judge = shipped["tdbm", DEFAULT_REFERENCE]
     assert isinstance(judge, TDBM)
 

@@ -1,4 +1,4 @@
-"""A corpus is never judged by a scaler that was fitted on it, or on other episodes of its seed."""
+"""A corpus is never judged by a scaler that was fitted on it, nor as driven by styles that were calibrated on it."""
 
 from __future__ import annotations
 
@@ -7,6 +7,7 @@ from typing import Any
 
 from stylesim.corpus import Corpus
 from stylesim.errors import InputError
+from stylesim.styles import calibration_file, load_calibration
 
 _SEEDS = ("corpus_seed", "corpus_seeds", "seed", "seeds")
 _PRINTS = ("corpus_fingerprint", "corpus_fingerprints", "corpus_sha256", "fingerprint", "fingerprints")
@@ -41,3 +42,19 @@ def check_unseen(corpus: Corpus, provenance: Mapping[str, Any], *, what: str) ->
             f"{corpus.path} has seed {seed}, which {what} was fitted on: its drivers and episodes are the same. "
             "Generate another one with another --seed."
         )
+
+
+def check_not_calibrated_on(corpus: Corpus, backends: tuple[str, ...] = ("sumo", "highway")) -> None:
+    """InputError if the corpus has a seed that the shipped styles of a backend were calibrated with."""
+    seed = corpus.manifest.get("seed")
+    for backend in backends:
+        path = calibration_file(backend)
+        if path is None or not isinstance(seed, int):
+            continue
+        seeds = load_calibration(path).provenance.get("seeds", {})
+        rounds = [value for value in seeds.get("rounds", ()) if isinstance(value, int)]
+        if rounds and min(rounds) <= seed <= max(rounds):
+            raise InputError(
+                f"{corpus.path} has seed {seed}, one of those that {path.name} was calibrated with ({min(rounds)} to "
+                f"{max(rounds)}): calibration and judgement share no seed. Generate another one with another --seed."
+            )

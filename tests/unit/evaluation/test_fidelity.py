@@ -140,6 +140,19 @@ def test_a_corpus_of_a_scalers_seed_or_of_its_very_bytes_is_refused(tmp_path, co
     check_unseen(corpus, {"corpus_fingerprint": "", "corpus_seed": 4}, what="a scaler")
 
 
+def test_a_corpus_of_a_seed_of_the_calibration_is_refused(tmp_path, corpus, monkeypatch):
+    import stylesim.evaluation.scaler_guard as guard
+
+    class Made:
+        provenance = {"seeds": {"rounds": [3, 9], "checks": [2]}}  # noqa: RUF012
+
+    monkeypatch.setattr(guard, "calibration_file", lambda backend: Path(f"styles.{backend}.yaml"))
+    monkeypatch.setattr(guard, "load_calibration", lambda path: Made)
+    with pytest.raises(InputError, match=r"seed 5, one of those that styles\.sumo\.yaml was calibrated with"):
+        fidelity(corpus)
+    guard.check_not_calibrated_on(write(tmp_path / "other", [corpus.scene("s0")], seed=2))
+
+
 def test_recordings_and_unknown_scenarios_are_refused(tmp_path, corpus):
     scene = make_scene("s", n_agents=3, n_frames=FRAMES)
     recorded = write(tmp_path / "r", [replace(scene, tracks=replace(scene.tracks, driver=()))])
