@@ -73,6 +73,11 @@ def realism(
     real: list[Path] = typer.Argument(help="Recorded corpora (`stylesim read`)."),
     out: Path | None = typer.Option(None, "--out", help="Write every figure as JSON to this file."),
     report: Path | None = typer.Option(None, "--report", help="Write an HTML page with figures to this file."),
+    reference: str = typer.Option(
+        "",
+        help="Frozen scaler that measures styles; without it real-reference. It has towns only: for motorways "
+        "sim-reference.",
+    ),
     seed: int = typer.Option(0, min=0, help="Of the bootstrap and the splits of the floor."),
 ) -> None:
     """How far simulated traffic is from recordings, and recordings from each other, matched by speed and density."""
@@ -94,7 +99,7 @@ def realism(
                 progress.stage(stage, "scenes")
             progress(done, total)
 
-        found = run(opened, recorded, seed=seed, progress=tell)
+        found = run(opened, recorded, reference=reference, seed=seed, progress=tell)
     show_realism(found)
     if out is not None:
         text = json.dumps(found.to_dict(), indent=1, sort_keys=True, allow_nan=False, ensure_ascii=False)

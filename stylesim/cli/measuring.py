@@ -135,6 +135,9 @@ def show_fidelity(found: Fidelity) -> None:
                 for one in listed
             ]
             show_table(f"KDSC, {reference}: share aggressive by commanded class", ("group", *STYLE_CLASSES), rows)
+    for name, one_labeler in found.about["labelers"].items():
+        for context in one_labeler["borrowed_contexts"]:
+            say(f"{name} was fitted on no {context} traffic: there its scale is that of all its drivers together.")
     for one in found.agreements:
         if one.span == "track" and one.group == EVERYONE and one.n_drivers:
             _confusion(one)

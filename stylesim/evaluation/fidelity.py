@@ -19,6 +19,7 @@ from stylesim.evaluation.fidelity_ranges import FeatureRanges, ranges_of
 from stylesim.evaluation.fidelity_robustness import Variant, robustness
 from stylesim.evaluation.fidelity_targets import HELD_TO_TARGET
 from stylesim.evaluation.scaler_guard import check_not_calibrated_on, check_unseen
+from stylesim.labelers.context import CONTEXTS
 from stylesim.labelers.kdsc import KDSC
 from stylesim.labelers.reference import DEFAULT_REFERENCE, default_labeler, scalers_dir
 from stylesim.labelers.tdbm import TDBM
@@ -161,6 +162,13 @@ def groups_of(people: CommandedDrivers) -> Iterator[tuple[str, Bool[np.ndarray, 
             yield f"{name}: {one}", own & (scenario == one)
 
 
+def borrowed_contexts(labeler: TDBM | KDSC) -> list[str]:
+    """The contexts in which a labeller has no drivers of its own, and scales by all of its drivers together."""
+    if isinstance(labeler, KDSC):
+        return []
+    return [name for name, n in zip(CONTEXTS, labeler.track_scaler_.drivers, strict=True) if n == 0]
+
+
 def _agreements(
     people: CommandedDrivers, shipped: Mapping[tuple[str, str], TDBM | KDSC], *, seed: int, draws: int
 ) -> tuple[tuple[Agreement, ...], StyleLabels]:
@@ -235,7 +243,11 @@ def _about(
         "scenarios": sorted(scenarios) or sorted({info.scenario for info in corpus.info}),
         "bootstrap": {"seed": seed, "draws": draws},
         "labelers": {
-            f"{reference}.{method}": {"sha256": labeler.hash_, "fitted_on": labeler.provenance_}
+            f"{reference}.{method}": {
+                "sha256": labeler.hash_,
+                "fitted_on": labeler.provenance_,
+                "borrowed_contexts": borrowed_contexts(labeler),
+            }
             for (method, reference), labeler in shipped.items()
         },
     }

@@ -24,6 +24,7 @@ def realism(
     sim: Corpus,
     real: Sequence[Corpus],
     *,
+    reference: str = "",
     seed: int = 0,
     draws: int = DRAWS,
     progress: Callable[[str, int, int], None] | None = None,
@@ -31,8 +32,9 @@ def realism(
     """Distances between distributions of driving, simulated against recorded, with real against real as the floor.
 
     Frames of moving motor vehicles count by their time. Blocks (episodes, recordings, or stretches of one recording)
-    are resampled for the intervals. Styles are the measured TDBM classes of both sides, by one frozen scaler
-    (`real-reference` where it is shipped, else `sim-reference`). `progress`: corpus, scenes done, their number.
+    are resampled for the intervals. Styles are the measured TDBM classes of both sides, by the frozen scaler
+    `reference` ("": `real-reference` where it is shipped, else `sim-reference`). `progress`: corpus, scenes done, their
+    number.
     InputError without a recording, for one corpus twice, or where nothing moves.
     """
     if not real:
@@ -40,7 +42,7 @@ def realism(
     prints = [one.fingerprint for one in (sim, *real)]
     if len(set(prints)) < len(prints):
         raise InputError("the same corpus was given twice; a corpus has no distance to itself")
-    judge = _judge()
+    judge = _judge(reference)
 
     def profiled(corpus: Corpus) -> Profile:
         def tell(done: int, total: int) -> None:
@@ -67,9 +69,9 @@ def realism(
     )
 
 
-def _judge() -> TDBM:
+def _judge(reference: str) -> TDBM:
     real = (scalers_dir() / "real-reference.tdbm.json").is_file()
-    labeler = default_labeler("tdbm", reference="real-reference" if real else "sim-reference")
+    labeler = default_labeler("tdbm", reference=reference or ("real-reference" if real else "sim-reference"))
     assert isinstance(labeler, TDBM)
     return labeler
 

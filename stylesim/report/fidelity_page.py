@@ -195,7 +195,10 @@ def _excluded_section(found: Fidelity) -> Section:
 def _provenance_section(found: Fidelity) -> Section:
     about = found.about
     facts = {**about["corpus"], "scenarios": ", ".join(about["scenarios"]), **about["bootstrap"]}
-    scalers = {name: one["sha256"] for name, one in about["labelers"].items()}
+    scalers = {
+        name: one["sha256"] + "".join(f"; no {c} drivers, scaled by all" for c in one["borrowed_contexts"])
+        for name, one in about["labelers"].items()
+    }
     raw = json.dumps(about["labelers"], indent=1, sort_keys=True)
     blocks = (
         Block(table=facts_table("Corpus", {k: v for k, v in facts.items() if k != "population"})),
