@@ -11,14 +11,14 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from pathlib import Path
-from typing import Any
 
 import numpy as np
-import polars as pl
 from jaxtyping import Float64
 
 from stylesim.datasets.accounting import row_counts
 from stylesim.datasets.av2_map import read_map
+from stylesim.datasets.av2_tables import N_FRAMES, AvTable, table_of
+from stylesim.datasets.dense import refuse_other_units
 from stylesim.datasets.flagging import flagged_implausible
 from stylesim.datasets.sniffing import matching
 from stylesim.errors import InputError
@@ -29,9 +29,7 @@ from stylesim.tracks import AgentKind, TrackFlag, Tracks
 SOURCE = "av2"
 DT_S = 0.1
 T0_FRAME = 49  # the last of 50 observed frames, by definition of the benchmark
-N_FRAMES = 110
 SPLITS = ("train", "val", "test")
-MAX_SPEED_MPS = 70.0  # chosen, as in `plausible`: 252 km/h
 
 KINDS = {
     "vehicle": AgentKind.CAR,
@@ -55,16 +53,6 @@ NOMINAL_SIZE_M = {
     AgentKind.PEDESTRIAN: (0.6, 0.6),
     AgentKind.STATIC: (1.0, 1.0),
     AgentKind.OTHER: (1.0, 1.0),
-}
-_NUMBERS = ("position_x", "position_y", "heading", "velocity_x", "velocity_y")
-_COLUMNS: dict[str, Any] = {
-    "track_id": pl.String,
-    "object_type": pl.String,
-    "timestep": pl.Int64,
-    **dict.fromkeys(_NUMBERS, pl.Float64),
-    "scenario_id": pl.String,
-    "focal_track_id": pl.String,
-    "city": pl.String,
 }
 
 
@@ -114,82 +102,41 @@ def _parquet(folder: Path) -> Path | None:
 def _scene(folder: Path, split: str) -> Scene:
     file = _parquet(folder)
     assert file is not None
-    raw = _read(file)
-    table, dropped = _clean(raw, file)
-    scenario_id = str(table["scenario_id"][0])
-    xy = table.select("position_x", "position_y").to_numpy()
-    first = xy[table["timestep"].to_numpy() == table["timestep"].min()]
-    origin = np.round(first.mean(axis=0))  # of the first frame only: what comes later moves nothing
-    observed = int(table["timestep"].max()) + 1  # type: ignore[arg-type]
+    table = table_of(file)
+    first = table.numbers[table.frame == table.frame.min(), :2]
+    origin = np.round(np.median(first, axis=0))  # of the first frame only: what comes later moves nothing
+    observed = int(table.frame.max()) + 1
     maps = sorted(folder.glob("log_map_archive_*.json"))
     if not maps:
         raise InputError(f"{folder} has no log_map_archive_*.json beside {file.name}; the copy is incomplete")
+    tracks = flagged_implausible(_tracks(table, origin, T0_FRAME + 1 if observed <= T0_FRAME + 1 else N_FRAMES))
+    refuse_other_units(tracks, file)
     return Scene(
-        scene_id=f"av2_{scenario_id}",
-        unit_id=f"av2_{scenario_id}",
+        scene_id=f"av2_{table.scenario_id}",
+        unit_id=f"av2_{table.scenario_id}",
         source=SOURCE,
-        scenario=str(table["city"][0]),
-        tracks=flagged_implausible(_tracks(table, origin, T0_FRAME + 1 if observed <= T0_FRAME + 1 else N_FRAMES)),
+        scenario=table.city,
+        tracks=tracks,
         road=read_map(maps[0], origin),
-        source_scenario_id=scenario_id,
+        source_scenario_id=table.scenario_id,
         official_split=split,
         t0_frame=T0_FRAME,
-        counts=row_counts(rows_in=raw.height, rows_out=table.height, dropped=dropped),
+        counts=row_counts(rows_in=table.rows_in, rows_out=len(table.frame), dropped=table.dropped),
     )
 
 
-def _read(file: Path) -> pl.DataFrame:
-    try:
-        table = pl.read_parquet(file)
-    except (OSError, pl.exceptions.PolarsError, pl.exceptions.PanicException) as error:
-        reason = (str(error).splitlines() or ["unreadable"])[0]
-        raise InputError(f"{file} is damaged or no Parquet file ({reason}); get it again") from error
-    absent = [name for name in _COLUMNS if name not in table.columns]
-    if absent:
-        raise InputError(f"{file} lacks the columns {', '.join(absent)}; it is no scenario of Argoverse 2")
-    try:
-        return table.select(pl.col(name).cast(dtype) for name, dtype in _COLUMNS.items())
-    except pl.exceptions.PolarsError as error:
-        raise InputError(f"{file} has a column of the wrong type ({str(error).splitlines()[0]})") from error
-
-
-def _clean(table: pl.DataFrame, file: Path) -> tuple[pl.DataFrame, dict[str, int]]:
-    """The usable rows sorted by track and time, and how many were dropped for which reason."""
-    for name in ("scenario_id", "city", "focal_track_id"):
-        if table[name].n_unique() > 1:
-            raise InputError(f"{file} holds {table[name].n_unique()} values of {name}; a scenario has one")
-    numbers = [pl.col(name).is_finite().fill_null(False) for name in _NUMBERS]
-    ids = [pl.col(name).is_not_null() for name in ("track_id", "object_type", "timestep", "scenario_id")]
-    readable = table.filter(pl.all_horizontal(*numbers, *ids))
-    speed2 = pl.col("velocity_x").pow(2) + pl.col("velocity_y").pow(2)
-    plausible = readable.filter(pl.col("timestep").is_between(0, N_FRAMES - 1) & (speed2 <= MAX_SPEED_MPS**2))
-    once = plausible.unique(["track_id", "timestep"], keep="first", maintain_order=True).sort("track_id", "timestep")
-    if once.is_empty():
-        raise InputError(f"{file} has no usable row")
-    lost = {
-        "unreadable": table.height - readable.height,
-        "implausible": readable.height - plausible.height,
-        "duplicate": plausible.height - once.height,
-    }
-    return once, lost
-
-
-def _tracks(table: pl.DataFrame, origin_m: Float64[np.ndarray, " 2"], n_frames: int) -> Tracks:
-    ids, agent = np.unique(table["track_id"].to_numpy(), return_inverse=True)
-    frame = table["timestep"].to_numpy()
-    first = np.searchsorted(agent, np.arange(len(ids)))
-    kind = np.array([int(KINDS.get(table["object_type"][int(i)], AgentKind.OTHER)) for i in first], np.int8)
-    at = (agent, frame)
-    shape = (len(ids), n_frames)
+def _tracks(table: AvTable, origin_m: Float64[np.ndarray, " 2"], n_frames: int) -> Tracks:
+    kind = np.array([int(KINDS.get(name, AgentKind.OTHER)) for name in table.object_type], np.int8)
+    at = (table.agent, table.frame)
+    shape = (len(table.agent_id), n_frames)
     valid = np.zeros(shape, bool)
     valid[at] = True
     position, velocity = np.full((*shape, 2), np.nan, np.float32), np.full((*shape, 2), np.nan, np.float32)
     heading = np.full(shape, np.nan, np.float32)
-    position[at] = table.select("position_x", "position_y").to_numpy() - origin_m
-    velocity[at] = table.select("velocity_x", "velocity_y").to_numpy()
-    heading[at] = wrap_angle(table["heading"].to_numpy())
+    position[at], velocity[at] = table.numbers[:, 0:2] - origin_m, table.numbers[:, 3:5]
+    heading[at] = wrap_angle(table.numbers[:, 2])
     return Tracks(
-        agent_id=tuple(str(i) for i in ids),
+        agent_id=table.agent_id,
         kind=kind,
         size_m=np.array([NOMINAL_SIZE_M[AgentKind(k)] for k in kind.tolist()], np.float32),
         position_m=position,
@@ -198,10 +145,10 @@ def _tracks(table: pl.DataFrame, origin_m: Float64[np.ndarray, " 2"], n_frames: 
         valid=valid,
         dt_s=DT_S,
         origin_m=origin_m,
-        flags=np.array([_flags(str(i), table["focal_track_id"][0]) for i in ids], np.int32),
+        flags=np.array([_flags(name, table.focal_track_id) for name in table.agent_id], np.int32),
     )
 
 
-def _flags(track_id: str, focal_track_id: str | None) -> int:
+def _flags(track_id: str, focal_track_id: str) -> int:
     flag = int(TrackFlag.FOCAL) if track_id == focal_track_id else 0
     return flag | (int(TrackFlag.EGO) if track_id == "AV" else 0)

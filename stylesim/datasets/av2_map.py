@@ -4,15 +4,15 @@ from __future__ import annotations
 
 import json
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 import numpy as np
-from jaxtyping import Float32, Float64
+from jaxtyping import Float32, Float64, Int64
 
 from stylesim.datasets.guarding import bounded, reading
-from stylesim.datasets.polylines import map_line
-from stylesim.geometry import arc_length, resampled
+from stylesim.datasets.polylines import MAX_MAP_M
 from stylesim.road import Lane, Road
 
 # Lanes for motor traffic [read: the lane types of the format are VEHICLE, BUS, BIKE]. A bicycle lane would be
@@ -32,22 +32,83 @@ def read_map(path: Path, origin_m: Float64[np.ndarray, " 2"]) -> Road:
     with reading(path, "Argoverse 2 map"):
         document = json.loads(path.read_bytes())
         segments = [s for s in document["lane_segments"].values() if s["lane_type"] in DRIVABLE]
+        crossings = list(document.get("pedestrian_crossings", {}).values())
+        sides = [s[f"{side}_lane_boundary"] for s in segments for side in ("left", "right")]
+        edges = [crossing[edge] for crossing in crossings for edge in ("edge1", "edge2")]
+        given = [s["centerline"] for s in segments if s.get("centerline")]
+        lines = _Lines.of([*sides, *edges, *given], origin_m)
+        even = lines.even(len(sides)).reshape(-1, 2, BOUNDARY_POINTS, 2)
+        middle = even.mean(axis=1).astype(np.float32)
+        width = np.median(np.hypot(*np.moveaxis(even[:, 0] - even[:, 1], -1, 0)), axis=-1)
+        centre = iter(range(len(sides) + len(edges), len(lines.start)))
         known = {str(s["id"]) for s in segments}
-        lanes = tuple(_lane(segment, known, origin_m) for segment in segments)
-        walks = tuple(_crosswalk(c, origin_m) for c in document.get("pedestrian_crossings", {}).values())
+        lanes = tuple(
+            _lane(
+                segment,
+                known,
+                (lines.line(2 * i), lines.line(2 * i + 1)),
+                lines.line(next(centre)) if segment.get("centerline") else middle[i],
+                float(width[i]),
+            )
+            for i, segment in enumerate(segments)
+        )
+        first = len(sides)
+        walks = tuple(
+            np.concatenate([lines.line(first + 2 * i), lines.line(first + 2 * i + 1)[::-1]])
+            for i in range(len(crossings))
+        )
         return Road(lanes=lanes, source="map", crosswalks_m=walks)
 
 
-def _lane(segment: Mapping[str, Any], known: set[str], origin_m: Float64[np.ndarray, " 2"]) -> Lane:
-    left = _points(segment["left_lane_boundary"], origin_m)
-    right = _points(segment["right_lane_boundary"], origin_m)
-    centre = _points(segment["centerline"], origin_m) if segment.get("centerline") else _middle(left, right)
+@dataclass(frozen=True, eq=False)
+class _Lines:
+    """All lines of a map in one array: a map has hundreds, of a few points each."""
+
+    points_m: Float64[np.ndarray, "point 2"]
+    start: Int64[np.ndarray, " line"]  # of each line, and the end of the last
+
+    @classmethod
+    def of(cls, lines: Sequence[Sequence[Mapping[str, float]]], origin_m: Float64[np.ndarray, " 2"]) -> _Lines:
+        """Lines in metres from `origin_m`; repeated points are left out. ValueError as `polylines.map_line`."""
+        owner = np.repeat(np.arange(len(lines)), [len(line) for line in lines])
+        points = np.array([(p["x"], p["y"]) for line in lines for p in line], np.float64).reshape(-1, 2) - origin_m
+        if not (np.abs(points) <= MAX_MAP_M).all():  # not-a-number fails too
+            raise ValueError("a point of the map is not finite or too far away")
+        apart = np.ones(len(points), bool)
+        apart[1:] = (np.hypot(*np.diff(points, axis=0).T) > 1e-6) | (owner[1:] != owner[:-1])
+        start = np.searchsorted(owner[apart], np.arange(len(lines) + 1))
+        if (np.diff(start) < 2).any():
+            raise ValueError("a line has less than two points")
+        return cls(points[apart], start.astype(np.int64))
+
+    def line(self, number: int) -> Float32[np.ndarray, "point 2"]:
+        """One of the lines."""
+        return self.points_m[self.start[number] : self.start[number + 1]].astype(np.float32)
+
+    def even(self, n: int) -> Float64[np.ndarray, "line sample 2"]:
+        """BOUNDARY_POINTS points at equal distances along each of the first `n` lines, ends included."""
+        points, start = self.points_m[: self.start[n]], self.start[: n + 1]
+        step = np.hypot(*np.diff(points, axis=0, prepend=points[:1]).T)
+        step[start[:-1]] = 1.0  # lines lie one behind the other on one axis
+        along = np.cumsum(step)
+        first, last = along[start[:-1]], along[start[1:] - 1]
+        at = first[:, None] + np.linspace(0.0, 1.0, BOUNDARY_POINTS) * (last - first)[:, None]
+        return np.stack([np.interp(at, along, points[:, 0]), np.interp(at, along, points[:, 1])], -1)
+
+
+def _lane(
+    segment: Mapping[str, Any],
+    known: set[str],
+    sides_m: tuple[Float32[np.ndarray, "l 2"], Float32[np.ndarray, "r 2"]],
+    centre_m: Float32[np.ndarray, "point 2"],
+    width_m: float,
+) -> Lane:
     return Lane(
         lane_id=str(segment["id"]),
-        centre_line_m=centre,
-        width_m=float(np.median(np.hypot(*(_even(left) - _even(right)).T))),
-        left_boundary_m=left,
-        right_boundary_m=right,
+        centre_line_m=centre_m,
+        width_m=width_m,
+        left_boundary_m=sides_m[0],
+        right_boundary_m=sides_m[1],
         successors=tuple(str(i) for i in segment["successors"] if str(i) in known),
         left_neighbour=_neighbour(segment["left_neighbor_id"], known),
         right_neighbour=_neighbour(segment["right_neighbor_id"], known),
@@ -57,25 +118,3 @@ def _lane(segment: Mapping[str, Any], known: set[str], origin_m: Float64[np.ndar
 
 def _neighbour(lane_id: Any, known: set[str]) -> str:
     return str(lane_id) if lane_id is not None and str(lane_id) in known else ""
-
-
-def _points(
-    points: Sequence[Mapping[str, float]], origin_m: Float64[np.ndarray, " 2"]
-) -> Float32[np.ndarray, "point 2"]:
-    return map_line([[p["x"], p["y"]] for p in points], origin_m)
-
-
-def _even(line_m: Float32[np.ndarray, "point 2"]) -> Float64[np.ndarray, "sample 2"]:
-    length = float(arc_length(line_m)[-1])
-    even = resampled(line_m.astype(np.float64), max(length / (BOUNDARY_POINTS - 1), 1e-6) * (1 + 1e-9))
-    at = np.linspace(0, len(even) - 1, BOUNDARY_POINTS).round().astype(int)
-    return even[at]
-
-
-def _middle(left: Float32[np.ndarray, "l 2"], right: Float32[np.ndarray, "r 2"]) -> Float32[np.ndarray, "point 2"]:
-    return ((_even(left) + _even(right)) / 2).astype(np.float32)
-
-
-def _crosswalk(crossing: Mapping[str, Any], origin_m: Float64[np.ndarray, " 2"]) -> Float32[np.ndarray, "corner 2"]:
-    one, other = _points(crossing["edge1"], origin_m), _points(crossing["edge2"], origin_m)
-    return np.concatenate([one, other[::-1]])

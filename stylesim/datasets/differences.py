@@ -29,7 +29,8 @@ def causal_velocity(
         slope = np.full(position_m.shape, np.nan)
         now, then = (slice(lag, n), slice(0, n - lag)) if lag > 0 else (slice(0, n + lag), slice(-lag, n))
         there[:, now] = valid[:, now] & valid[:, then]
-        slope[:, now] = (position_m[:, now] - position_m[:, then]) / (time_s[now] - time_s[then])[:, None]
+        with np.errstate(over="ignore", invalid="ignore"):  # of a damaged position: its rows are dropped later
+            slope[:, now] = (position_m[:, now] - position_m[:, then]) / (time_s[now] - time_s[then])[:, None]
         new = there & np.isnan(velocity).any(-1)
         velocity[new] = slope[new]
         ahead[new] = max(0, -lag)
@@ -38,6 +39,7 @@ def causal_velocity(
             bent[:, stride:] = there[:, stride:] & there[:, :-stride]
             share = (time_s[2 * stride :] - time_s[stride:-stride]) / (time_s[2 * stride :] - time_s[: -2 * stride])
             turned = slope.copy()
-            turned[:, 2 * stride :] += share[:, None] * (slope[:, 2 * stride :] - slope[:, stride:-stride])
+            with np.errstate(over="ignore", invalid="ignore"):
+                turned[:, 2 * stride :] += share[:, None] * (slope[:, 2 * stride :] - slope[:, stride:-stride])
             velocity[bent] = turned[bent]
     return velocity, ahead

@@ -11,6 +11,8 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
+import numpy as np
+
 from stylesim.errors import InputError, StylesimError
 
 MAX_BYTES = 4 << 30  # chosen: larger than any single file of the formats; a bigger one is refused, not loaded
@@ -20,12 +22,14 @@ MAX_BYTES = 4 << 30  # chosen: larger than any single file of the formats; a big
 def reading(file: Path, what: str) -> Iterator[None]:
     """A block that parses `file`, which should be `what` ("an Argoverse 2 map").
 
-    InputError naming the file for everything that bad content can raise; errors of ours pass unchanged.
+    InputError naming the file for everything that bad content can raise; errors of ours pass unchanged. Overflow and
+    the like are silent here: every number is held against its bounds before it is kept (`dense`, `rows`).
     """
     import polars as pl
 
     try:
-        yield
+        with np.errstate(all="ignore"):
+            yield
     except StylesimError:
         raise
     except OSError as error:

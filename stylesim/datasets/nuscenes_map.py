@@ -65,9 +65,8 @@ def _lane(
     token = str(record["token"])
     centre = map_line(np.concatenate([arc_points(path) for path in document["arcline_path_3"][token]]), _ORIGIN)
     length = float(arc_length(centre)[-1])
-    width = (
-        _area(outline[record["polygon_token"]]) / max(length, 1e-3) if record.get("polygon_token") in outline else 0.0
-    )
+    area = map_line(outline[record["polygon_token"]], _ORIGIN) if record.get("polygon_token") in outline else None
+    width = 0.0 if area is None else _area(area) / max(length, 1e-3)
     sides = [
         [nodes[s["node_token"]] for s in record.get(f"{side}_lane_divider_segments") or () if s["node_token"] in nodes]
         for side in ("left", "right")
@@ -110,8 +109,8 @@ def arc_points(path: Mapping[str, Any]) -> Float64[np.ndarray, "point 2"]:
     return np.concatenate(points)
 
 
-def _area(outline: list[tuple[float, float]]) -> float:
-    x, y = np.array(outline, np.float64).T
+def _area(outline_m: Float32[np.ndarray, "corner 2"]) -> float:
+    x, y = outline_m.astype(np.float64).T
     return float(abs(np.sum(x * np.roll(y, -1) - y * np.roll(x, -1))) / 2)
 
 

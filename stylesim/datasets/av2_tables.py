@@ -1,0 +1,126 @@
+"""The table of an Argoverse 2 scenario: checked, sorted by track and time, what was dropped counted."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import polars as pl
+from jaxtyping import Bool, Float64, Int64
+
+from stylesim.datasets.plausible import MAX_DISTANCE_M, MAX_SPEED_MPS
+from stylesim.errors import InputError
+
+N_FRAMES = 110
+_NUMBERS = ("position_x", "position_y", "heading", "velocity_x", "velocity_y")
+_IDS = ("track_id", "object_type", "timestep")
+_SINGLE = ("scenario_id", "city", "focal_track_id")
+_COLUMNS: dict[str, Any] = {
+    "track_id": pl.String,
+    "object_type": pl.String,
+    "timestep": pl.Int64,
+    **dict.fromkeys(_NUMBERS, pl.Float64),
+    **dict.fromkeys(_SINGLE, pl.String),
+}
+
+
+@dataclass(frozen=True, eq=False)
+class AvTable:
+    """The usable rows of a scenario, one per (agent, frame), and what stands once in the file."""
+
+    scenario_id: str
+    city: str
+    focal_track_id: str
+    agent_id: tuple[str, ...]
+    object_type: tuple[str, ...]  # of each agent's first row
+    agent: Int64[np.ndarray, " row"]
+    frame: Int64[np.ndarray, " row"]
+    numbers: Float64[np.ndarray, "row 5"]  # x, y, heading, vx, vy
+    rows_in: int
+    dropped: dict[str, int]
+
+
+def table_of(file: Path) -> AvTable:
+    """The table in that file. InputError where it is damaged, lacks a column, or holds no usable row.
+
+    Dropped: `unreadable` (a value is missing or not finite), `implausible` (no frame of a scenario, faster than
+    MAX_SPEED_MPS, or farther than MAX_DISTANCE_M from the middle), `duplicate` (a second row of a track in a frame).
+    """
+    table = _read(file)
+    single = [_once(table, name, file) for name in _SINGLE]
+    columns = [table[name].to_numpy() for name in _NUMBERS]
+    numbers = np.stack([np.asarray(column, np.float64) for column in columns], -1)
+    frame = np.asarray(table["timestep"].fill_null(-1).to_numpy(), np.int64)
+    readable = np.isfinite(numbers).all(axis=1)
+    for name in _IDS:
+        if table[name].null_count():
+            readable &= table[name].is_not_null().to_numpy()
+    kept: Bool[np.ndarray, " row"] = readable & _plausible(numbers, frame, np.asarray(readable))
+    if not kept.any():
+        raise InputError(f"{file} has no usable row")
+    codes = table["track_id"].cast(pl.Categorical).to_physical().to_numpy()
+    rows = np.flatnonzero(kept)
+    _, first, code = np.unique(codes[rows], return_index=True, return_inverse=True)
+    names = np.array([str(table["track_id"][int(rows[i])]) for i in first])
+    rank = np.argsort(np.argsort(names))  # agents in the order of their ids
+    agent = rank[code]
+    key = agent * N_FRAMES + frame[rows]
+    _, once = np.unique(key, return_index=True)
+    rows, agent = rows[once], agent[once]
+    begins = np.searchsorted(agent, np.arange(len(names)))
+    return AvTable(
+        scenario_id=single[0],
+        city=single[1],
+        focal_track_id=single[2],
+        agent_id=tuple(np.sort(names).tolist()),
+        object_type=tuple(str(table["object_type"][int(i)]) for i in rows[begins]),
+        agent=agent.astype(np.int64),
+        frame=frame[rows],
+        numbers=numbers[rows],
+        rows_in=table.height,
+        dropped={
+            "unreadable": int((~readable).sum()),
+            "implausible": int((readable & ~kept).sum()),
+            "duplicate": len(key) - len(rows),
+        },
+    )
+
+
+def _plausible(
+    numbers: Float64[np.ndarray, "row 5"], frame: Int64[np.ndarray, " row"], readable: Bool[np.ndarray, " row"]
+) -> Bool[np.ndarray, " row"]:
+    middle = np.median(numbers[readable, :2], axis=0) if readable.any() else np.zeros(2)
+    with np.errstate(invalid="ignore", over="ignore"):
+        slow = np.hypot(numbers[:, 3], numbers[:, 4]) <= MAX_SPEED_MPS
+        near = (np.abs(numbers[:, :2] - middle) <= MAX_DISTANCE_M).all(axis=1)
+    return slow & near & (frame >= 0) & (frame < N_FRAMES) & (np.abs(numbers[:, 2]) < 1e4)
+
+
+def _once(table: pl.DataFrame, name: str, file: Path) -> str:
+    """What stands in every row of that column."""
+    values = table[name].unique()
+    if len(values) > 1:
+        raise InputError(f"{file} holds {len(values)} values of {name}; a scenario has one")
+    value = values[0] if len(values) else None
+    if value is None and name == "scenario_id":
+        raise InputError(f"{file} has no scenario_id, or no row")
+    return str(value or "")
+
+
+def _read(file: Path) -> pl.DataFrame:
+    try:
+        table = pl.read_parquet(file)
+    except (OSError, pl.exceptions.PolarsError, pl.exceptions.PanicException) as error:
+        reason = (str(error).splitlines() or ["unreadable"])[0]
+        raise InputError(f"{file} is damaged or no Parquet file ({reason}); get it again") from error
+    absent = [name for name in _COLUMNS if name not in table.columns]
+    if absent:
+        raise InputError(f"{file} lacks the columns {', '.join(absent)}; it is no scenario of Argoverse 2")
+    if all(table.schema[name] == dtype for name, dtype in _COLUMNS.items()):
+        return table
+    try:
+        return table.select(pl.col(name).cast(dtype) for name, dtype in _COLUMNS.items())
+    except pl.exceptions.PolarsError as error:
+        raise InputError(f"{file} has a column of the wrong type ({str(error).splitlines()[0]})") from error
