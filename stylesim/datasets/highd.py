@@ -79,7 +79,7 @@ def _tracks(triple: Triple, recording_id: str, dt_s: float) -> tuple[pl.DataFram
         kinds = kinds.with_columns(direction=pl.lit(None, pl.Int64))
     table = table.select(
         agent="id",
-        frame=frame.round(0).cast(pl.Int64),
+        frame=frame.round(0).cast(pl.Int64) - 1,  # counted from 1 [read]
         x=pl.col("x") + pl.col("width") / 2,
         y=-(pl.col("y") + pl.col("height") / 2),
         vx="xVelocity",

@@ -61,7 +61,7 @@ def sample(folder: Path) -> Path:
     table = cars()
     text = portal_text([("peachtree", 1163018600, table), ("peachtree", 1163030300, table), ("us-101", 5000, table)])
     lines = text.splitlines()
-    text = "\n".join([*lines, lines[5], lines[6].replace("11630", "99930")]) + "\n"
+    text = "\n".join([*lines, lines[5], lines[6].replace("1163", "9993")]) + "\n"
     path = folder / "portal.csv"
     path.write_text(text, encoding="utf-8")
     return path
