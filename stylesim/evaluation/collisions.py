@@ -26,6 +26,7 @@ class Collision:
 
     `charged` are those whose doing it is: the one that ran a red light; driving the same way, the one behind, or the
     one that moved over; crossing, the one whose front hit the other's side. Both where that does not decide it.
+    `under_stressor`: one of them did or met something unusual on purpose (a stressor of the episode) before.
     """
 
     first: int
@@ -33,6 +34,7 @@ class Collision:
     frame: int
     how: str
     charged: tuple[int, ...]
+    under_stressor: bool = False
 
 
 def collisions_of(scene: Scene) -> tuple[list[Collision], int]:
@@ -46,6 +48,7 @@ def collisions_of(scene: Scene) -> tuple[list[Collision], int]:
     found = overlaps(
         frame, agent, tracks.position_m[agent, frame], tracks.heading_rad[agent, frame], tracks.size_m[agent]
     )
+    stress_from = _stress_from(scene)
     begin = np.where(tracks.valid.any(axis=1), tracks.valid.argmax(axis=1), 0)
     result, at_first_sight, known = [], 0, set()
     for when, a, b in found[np.argsort(found[:, 0], kind="stable")].tolist():
@@ -56,8 +59,19 @@ def collisions_of(scene: Scene) -> tuple[list[Collision], int]:
         if when <= max(begin[a], begin[b]):
             at_first_sight += 1
         else:
-            result.append(Collision(*pair, when, *_attributed(tracks, *pair, when)))
+            stressed = any(stress_from.get(tracks.agent_id[i], np.inf) <= when * tracks.dt_s for i in pair)
+            result.append(Collision(*pair, when, *_attributed(tracks, *pair, when), stressed))
     return result, at_first_sight
+
+
+def _stress_from(scene: Scene) -> dict[str, float]:
+    """Since when (s) each agent takes part in a stressor, from the scene's events."""
+    found: dict[str, float] = {}
+    for event in scene.metadata.get("events", ()):
+        for name in (event["actor"], event["victim"]):
+            if name:
+                found[name] = min(found.get(name, np.inf), float(event["time_s"]))
+    return found
 
 
 def _attributed(tracks: Tracks, a: int, b: int, frame: int) -> tuple[str, tuple[int, ...]]:

@@ -33,7 +33,7 @@ class DriverCriticality:
     `ttc` over the frames in which it closes on its leader, `headway` over those in which it follows moving, both within
     100 m; `pet_min_s` over all encounters on crossing ways, whether it came first or second. Counts are of encounters
     (an unbroken stretch behind one leader; one ordered pair). `collisions_charged` counts collisions it is charged
-    with (`collisions`), `in_collisions` all that it was part of.
+    with (`collisions`), but for those under a stressor; `in_collisions` all that it was part of.
     """
 
     scene_id: tuple[str, ...]
@@ -174,6 +174,9 @@ def _collided(scene: Scene, counts: Counter[str]) -> tuple[Int64[np.ndarray, " a
     counts["overlapped when first seen"] += at_first_sight
     for one in found:
         counts[f"collision: {one.how}"] += 1
-        charged[list(one.charged)] += 1
+        if one.under_stressor:
+            counts["collision under a stressor, charged to nobody"] += 1
+        else:
+            charged[list(one.charged)] += 1
         involved[[one.first, one.second]] += 1
     return charged, involved

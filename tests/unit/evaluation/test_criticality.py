@@ -91,6 +91,18 @@ def test_into_the_side_and_through_the_red():
     assert (one.how, one.charged) == (UNDECIDED, (0, 1))
 
 
+def test_nobody_is_charged_under_a_stressor(tmp_path):
+    event = {"kind": "hard_brake", "time_s": 2.0, "actor": "car-1", "victim": "car-0", "numbers": {}}
+    for time_s, charged in ((2.0, 0), (19.0, 1)):
+        scene = scene_of([straight(0.0, 15.0), straight(30.0, 12.0)], road=lanes(1))
+        scene = replace(scene, metadata={"events": [{**event, "time_s": time_s}]})
+        (one,), _ = collisions_of(scene)
+        assert one.under_stressor == (not charged)
+        found = drivers_criticality(written(tmp_path / f"c{charged}", [scene]))
+        assert found.drivers.collisions_charged.tolist() == [charged, 0]
+        assert found.drivers.in_collisions.tolist() == [1, 1]
+
+
 def test_cars_put_onto_each_other_did_not_collide():
     found, at_first = collisions_of(scene_of([straight(0.0, 10.0), straight(1.0, 10.0)], road=lanes(1)))
     assert (found, at_first) == ([], 1)
