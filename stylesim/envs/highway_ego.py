@@ -21,6 +21,7 @@ class EgoVehicle(StyledVehicle):
     squares: list[float]
     travelled_m: float
     steps: int
+    reds_run: int
 
     def obey(self, config: EnvConfig, name: str = EGO_ID) -> None:
         """Become an ego: take a name, and the limits of the configuration."""
@@ -32,12 +33,12 @@ class EgoVehicle(StyledVehicle):
 
     def start_clock(self) -> None:
         """The next step is the first of the episode."""
-        self.steps, self.squares, self.travelled_m = 0, [0.0], 0.0
+        self.steps, self.squares, self.travelled_m, self.reds_run = 0, [0.0], 0.0, 0
 
     def begin_period(self, command: EgoCommand) -> None:
         """A new decision: aim at the next lane on the asked side, if there is one."""
         self.command = command
-        self.squares, self.travelled_m = [], 0.0
+        self.squares, self.travelled_m, self.reds_run = [], 0.0, 0
         if command.lane_change and not self.crashed:
             start, end, lane = self.target_lane_index
             wanted = lane - command.lane_change  # highway-env counts lanes from the left

@@ -10,6 +10,7 @@ from jaxtyping import Float64
 
 from stylesim.envs.config import EnvConfig
 from stylesim.envs.highway_ego import EGO_ID, EgoVehicle
+from stylesim.envs.highway_lights import SeenLights
 from stylesim.envs.world import LEAVES, NO_DECISION, EgoCommand, EgoState, Picture, Snapshot
 from stylesim.errors import SimulationError
 from stylesim.geometry import wrap_angle
@@ -23,6 +24,7 @@ from stylesim.simulation.highway.spec import options_of
 from stylesim.simulation.highway.traffic import Crew, Traffic
 from stylesim.simulation.highway.vehicle import StyledVehicle
 from stylesim.style import STYLE_CLASSES
+from stylesim.tracks import TrackFlag
 
 CODES = {name: code for code, name in enumerate(STYLE_CLASSES)}
 SETTLE_S = 2.0  # chosen, because the crowd starts in loose columns and needs no more to take up its gaps
@@ -43,15 +45,17 @@ class HighwayWorld:
         """A new episode; InputError for a scenario that does not fit."""
         options = options_of(scenario)
         drawn = scenario.draw(stream(seed, 0, "", "parameters"))
-        crew = _CrewWithEgo(population, seed=seed, episode=0)
+        crew = Crew(population, seed=seed, episode=0)
         time_s = SETTLE_S + self._config.duration_s + self._config.period_s
         self._egos, self._last = [], {}
         self._traffic = traffic_of(options, drawn, crew, time_s=time_s)
+        self._lights = SeenLights(self._traffic.lights)
         self._dt_s = 1.0 / options.simulation_hz
         self._numbers: dict[str, int] = {name: number for number, name in enumerate(self._names)}
         self._hand_over(stream(seed, 0, EGO_ID, "entry"))
         for _ in range(round(SETTLE_S * options.simulation_hz)):
             self._traffic.advance()
+            self._lights.after_step(self._egos)
         for ego in self._egos:
             if ego.crashed or ego not in self._traffic.road.vehicles:
                 raise SimulationError(f"the ego was hit while the crowd of scenario {scenario.name!r} settled")
@@ -95,6 +99,7 @@ class HighwayWorld:
         assert self._traffic is not None
         for _ in range(max(1, round(self._config.period_s / self._dt_s))):
             self._traffic.advance()
+            self._lights.after_step(self._egos)
             driving = [ego for ego in self._egos if self._drives(ego)]
             if not driving:
                 break
@@ -105,10 +110,10 @@ class HighwayWorld:
         return not ego.crashed and ego in self._road().vehicles
 
     def picture(self) -> Picture:
-        """The road of this episode; it has no lights."""
+        """The road of this episode, and a stop line for each lane that has a light."""
         assert self._traffic is not None
         road = road_of(self._road().network, junction_nodes=self._traffic.junction_nodes)
-        return Picture(road, np.zeros((0, 2, 2)))
+        return Picture(road, self._lights.stop_lines_m(road))
 
     def close(self) -> None:
         """Forget the episode."""
@@ -138,10 +143,10 @@ class HighwayWorld:
             pose=np.array([_pose(car) for car in cars]),
             style=np.array([CODES[style.name] if style else -1 for style in styles], np.int8),
             knob=np.array([style.aggressiveness if style else 0.0 for style in styles], np.float32),
-            decision=np.full(len(cars), NO_DECISION, np.int8),
-            ran_red=np.zeros(len(cars), bool),
+            decision=np.array([NO_DECISION, *(self._lights.decision(car) for car in cars[1:])], np.int8),
+            ran_red=np.array([False, *(self._lights.flagged(car, TrackFlag.RAN_RED) for car in cars[1:])]),
             crashed=np.array([bool(car.crashed) for car in cars]),
-            lights=np.zeros(0, np.int8),
+            lights=self._lights.states(),
         )
 
     def _state(self, ego: EgoVehicle) -> EgoState:
@@ -166,17 +171,10 @@ class HighwayWorld:
             lanes_left=float(lane),
             lanes_right=float(len(self._road().network.graph[start][end]) - 1 - lane),
             collided=float(ego.crashed),
+            **self._lights.ahead_of(ego, self._dt_s),
         )
         self._last[ego.driver_id] = state
         return state
-
-
-class _CrewWithEgo(Crew):
-    """A crew that gives every car a driver but the egos."""
-
-    def hire(self, vehicle: StyledVehicle, *, limit_mps: float | None = None) -> None:
-        if not isinstance(vehicle, EgoVehicle):
-            super().hire(vehicle, limit_mps=limit_mps)
 
 
 def _pose(car: StyledVehicle) -> Float64[np.ndarray, " 7"]:

@@ -16,6 +16,7 @@ from stylesim.scenario import Scenario
 from stylesim.signals import SignalState
 from stylesim.simulation.sumo.engine import Engine
 from stylesim.simulation.sumo.episode import DT_S, prepare_episode, sumo_options
+from stylesim.simulation.sumo.flow import FlowSense
 from stylesim.simulation.sumo.live import poses_of, shifted
 from stylesim.simulation.sumo.live_wander import Wander
 from stylesim.simulation.sumo.stopzone import StopZone
@@ -50,6 +51,7 @@ class SumoCrowd:
         self.sumo: Any = engine.sumo
         self._yellow = YellowController(engine.sumo, self.files)
         self._zone = StopZone(engine.sumo, self.files)
+        self._flow = FlowSense(engine.sumo, self.files)
         self._wander = Wander(self.files)
         self._events_seen = 0
         self._step = 0
@@ -79,6 +81,7 @@ class SumoCrowd:
 
     def step(self) -> None:
         """0.1 s, with the drivers' decisions at yellow."""
+        self._flow.before_step(self._step)
         self._yellow.before_step(self._step)
         self._zone.before_step(self._step)
         self._engine.step()

@@ -16,6 +16,7 @@ from stylesim.plugins.restyle import STYLED_KINDS, SUFFIX, body_of, restyle
 from stylesim.population import Population
 from stylesim.randomness import stream
 from stylesim.simulation.sumo.episode import DT_S
+from stylesim.simulation.sumo.flow import FlowSense
 from stylesim.simulation.sumo.roads import read_network
 from stylesim.simulation.sumo.stopzone import StopZone
 from stylesim.simulation.sumo.vehicles import Driver
@@ -81,6 +82,7 @@ class StyledCrowd:
         self._pedals_not_carried = 0
         self._log = CrowdLog(sumo, population, network=self._network, net=net, seed=seed, rows=log)
         self._yellow = YellowController(sumo, self._log.episode)
+        self._flow = FlowSense(sumo, self._log.episode)
         self._zone = StopZone(sumo, self._log.episode) if solid_line else None
         already = list(sumo.vehicle.getIDList())
         self._log.take_in(already)
@@ -148,6 +150,7 @@ class StyledCrowd:
         )
 
     def _before_step(self) -> None:
+        self._flow.before_step(self._steps)
         self._yellow.before_step(self._steps)
         if self._zone is not None:
             self._zone.before_step(self._steps)

@@ -11,6 +11,7 @@ from highway_env.road.road import RoadNetwork
 from stylesim.population import Population
 from stylesim.randomness import stream
 from stylesim.signals import Signals
+from stylesim.simulation.highway.lights import Lights
 from stylesim.simulation.highway.road import StyledRoad
 from stylesim.simulation.highway.spec import HighwayOptions
 from stylesim.simulation.highway.vehicle import TOP_SPEED_MPS, StyledVehicle
@@ -73,6 +74,7 @@ class Traffic:
     """A road full of styled cars; `removed` names those that were taken away, with the reason."""
 
     junction_nodes = ""  # how the names of the nodes inside a junction begin; "" where there is none
+    lights: Lights | None = None
 
     def __init__(self, road: StyledRoad, crew: Crew, options: HighwayOptions) -> None:
         self.road = road

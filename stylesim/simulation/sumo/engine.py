@@ -76,6 +76,7 @@ class LaneApi(Protocol):
     """The part of `libsumo.lane` used here."""
 
     def getLastStepVehicleIDs(self, laneID: str) -> Sequence[str]: ...  # noqa: D102, N802
+    def getMaxSpeed(self, laneID: str) -> float: ...  # noqa: D102, N802
 
 
 @runtime_checkable
