@@ -29,9 +29,8 @@ def _text(value: Estimate, target: float | None = None) -> str:
 
 def _agreements(title: str, found: Sequence[Agreement]) -> None:
     """The six-class figures of every group."""
-    from stylesim.evaluation.fidelity_targets import met, targets_of
+    from stylesim.evaluation.fidelity_targets import targets_of, verdict
 
-    verdict = {True: "met", False: "missed", None: ""}
     rows = []
     for one in found:
         wanted = targets_of(one.group) if (one.method, one.span) == ("tdbm", "track") else {}
@@ -44,7 +43,7 @@ def _agreements(title: str, found: Sequence[Agreement]) -> None:
             _text(figures["balanced_accuracy"], wanted.get("balanced_accuracy")),
             _text(figures["kappa"], wanted.get("kappa")), _text(figures["class_rank"]),
             f"{figures['class_to_a'].value:.2f} of {figures['class_to_a_ceiling'].value:.2f}",
-            _text(figures["knob_to_a"], wanted.get("knob_to_a")), verdict[met(one) if wanted else None],
+            _text(figures["knob_to_a"], wanted.get("knob_to_a")), verdict(one) if wanted else "",
         ])  # fmt: skip
     columns = ("group", "drivers", "units", "least n", "classes", "balanced accuracy", "κ quadratic", "ρ class ranks",
                "ρ rank~a of ceiling", "ρ knob~a", "target")  # fmt: skip

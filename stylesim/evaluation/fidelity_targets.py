@@ -52,3 +52,12 @@ def met(agreement: Agreement) -> bool | None:
         return None
     reached = [agreement.estimates[name].value >= least for name, least in wanted.items()]
     return bool(all(reached) and agreement.classes_present >= CLASSES)
+
+
+def verdict(agreement: Agreement) -> str:
+    """Whether the targets are met or missed, noting where a class has too few drivers; "" where none applies."""
+    reached = met(agreement)
+    if reached is None:
+        return ""
+    few = min(agreement.per_class) < DRIVERS_PER_CLASS
+    return ("met" if reached else "missed") + (f", n < {DRIVERS_PER_CLASS} per class" if few else "")

@@ -11,7 +11,7 @@ from stylesim.corpus.files import write_whole
 from stylesim.errors import InputError
 from stylesim.evaluation.fidelity import EVERYONE, Fidelity
 from stylesim.evaluation.fidelity_agreement import TITLES, Agreement
-from stylesim.evaluation.fidelity_targets import CLASSES, EXCLUDED_AT_MOST, met, targets_of
+from stylesim.evaluation.fidelity_targets import CLASSES, EXCLUDED_AT_MOST, targets_of, verdict
 from stylesim.evaluation.label_summary import RANK_CEILING
 from stylesim.report.blocks import Block, Section, picture
 from stylesim.report.fidelity_figures import knob_figure, matrix_figure, ranges_figure
@@ -56,10 +56,10 @@ def _findings(found: Fidelity) -> list[str]:
     for one in found.of():
         if one.estimates and not one.estimates["kappa"].refused:
             value = one.estimates["balanced_accuracy"]
-            verdict = {True: "; targets met", False: "; a target is missed", None: ""}[met(one)]
+            said = f"; targets {verdict(one)}" if verdict(one) else ""
             listed.append(
                 f"{one.group}: balanced accuracy {value.value:.2f} [{value.low:.2f}, {value.high:.2f}] over "
-                f"{plural(one.n_drivers, 'driver')} of {plural(one.n_units, 'episode')}{verdict}."
+                f"{plural(one.n_drivers, 'driver')} of {plural(one.n_units, 'episode')}{said}."
             )
     return listed
 
