@@ -1,12 +1,13 @@
 """The decision at the yellow, executed: P(stop), decelerations and red-running of every style beside the sources.
 
-    python -m benchmarks.yellow_light [--backend sumo] [--seed 0] [--quick] [--approaches 20000] [--out FILE.json]
+    python -m benchmarks.yellow_light [--backend sumo|highway] [--seed 0] [--quick] [--approaches N] [--out FILE.json]
 
 Single drivers come up to a light so that the time to the stop line at the onset of yellow is uniform on 1 to 6 s
-(`benchmarks/dilemma`). Whether one stopped (stood before the line) or crossed is read from its track, as are braking
-and red-running; "drawn" is what it decided at the onset. Sources and the neutral curve: docs/REFERENCE.md, section 5.
+(SUMO: `benchmarks/dilemma`; highway-env: `hw_yellow_light` with the option arrivals: dilemma). Whether one stopped
+(stood before the line) or crossed is read from its track, as are braking and red-running; "drawn" is what it decided
+at the onset. Sources and the neutral curve: docs/REFERENCE.md, section 5.
 Sets: the six styles and neutral at 20 m/s and 4 s of yellow (Rakha et al. 2007), neutral at 13.9 and 16.7 m/s,
-neutral on a wet road, and the naturalistic mixture at 13.9 m/s and 3 s of yellow (an urban light, Promet).
+neutral on a wet road (SUMO), and the naturalistic mixture at 13.9 m/s and 3 s of yellow (an urban light, Promet).
 """
 
 from __future__ import annotations
@@ -38,13 +39,21 @@ from stylesim.simulation.backend import Backend, open_backend
 from stylesim.style import STYLE_CLASSES
 from stylesim.styles import style_table
 
-FOLDERS = {"sumo": Path(__file__).with_name("dilemma")}
 NEUTRAL = (2.14, 2.88)  # k in 1/s, m in s; REFERENCE section 5
 WET = (2.44, 3.0)
 TRID = ((5.6, 2.2), (1.6, 5.9))  # TRID 801675: s before the line, m/s2
 TRID_MEAN_MPS2 = 3.27
 PROMET_STOPPED, PROMET_RED = 0.33, 0.07
 MAX_RMSE, TOLERANCE, MAX_P = 0.05, 0.20, 1e-3
+
+
+def dilemma(backend: str) -> Scenario:
+    """The scenario of the benchmark, at 20 m/s and 4 s of yellow."""
+    if backend == "sumo":
+        return load_scenario(str(Path(__file__).with_name("dilemma")))
+    stream = load_scenario("hw_yellow_light")
+    longer = {"duration_s": 400.0, "warm_up_s": 5.0, "options": {**stream.options, "arrivals": "dilemma"}}
+    return changed(stream.model_copy(update=longer), speed_limit_mps=20.0, yellow_s=4.0)
 
 
 def changed(scenario: Scenario, **values: float) -> Scenario:
@@ -159,7 +168,7 @@ def print_red(styles: dict[str, Approaches], urban: Approaches) -> None:
 
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--backend", default="sumo", choices=sorted(FOLDERS))
+    parser.add_argument("--backend", default="sumo", choices=("sumo", "highway"))
     parser.add_argument("--seed", type=int, default=0)
     parser.add_argument("--approaches", type=int, default=20_600, help="per style; a few are not free and left out")
     parser.add_argument("--quick", action="store_true", help="a twentieth of the approaches")
@@ -167,7 +176,7 @@ def main() -> None:
     chosen = parser.parse_args()
     n = chosen.approaches // 20 if chosen.quick else chosen.approaches
     begun = time.process_time()
-    scenario = load_scenario(str(FOLDERS[chosen.backend]))
+    scenario = dilemma(chosen.backend)
     backend = open_backend(chosen.backend)
     print(f"backend {chosen.backend}, seed {chosen.seed}, {n} approaches per style; TTS uniform on 1 to 6 s")
     sets: dict[str, Approaches] = {}
@@ -182,7 +191,8 @@ def main() -> None:
     some = max(n // 2, min(n, 2000))
     add("neutral 13.9", "neutral", some, changed(scenario, speed_limit_mps=13.889, yellow_s=3.0))
     add("neutral 16.7", "neutral", some, changed(scenario, speed_limit_mps=16.667, yellow_s=4.0))
-    add("neutral wet", "neutral", some, changed(scenario, wet_road=1.0))
+    if "wet_road" in scenario.parameters:
+        add("neutral wet", "neutral", some, changed(scenario, wet_road=1.0))
     add("naturalistic", Population.load("naturalistic"), n, changed(scenario, speed_limit_mps=13.889, yellow_s=3.0))
     backend.close()
     table = style_table().parameters
@@ -193,8 +203,9 @@ def main() -> None:
         law = NEUTRAL if style == "neutral" else own
         curves[style] = stop_curve(sets[style], slope_per_s=law[0], midpoint_s=law[1])
         rmse[style] = print_curve(style, curves[style], law)
-    curves["neutral wet"] = stop_curve(sets["neutral wet"], slope_per_s=WET[0], midpoint_s=WET[1])
-    rmse["neutral wet"] = print_curve("neutral, wet road", curves["neutral wet"], WET)
+    if "neutral wet" in sets:
+        curves["neutral wet"] = stop_curve(sets["neutral wet"], slope_per_s=WET[0], midpoint_s=WET[1])
+        rmse["neutral wet"] = print_curve("neutral, wet road", curves["neutral wet"], WET)
     least = min(item.stopped.n for item in curves["neutral"])
     print(
         f"\nRMSE to the published neutral curve: {rmse['neutral']:.3f} (target {MAX_RMSE}): "
