@@ -31,13 +31,18 @@ def read(
     option: list[str] = typer.Option(
         [], "--option", "-o", help="The reader's own options, KEY=VALUE, repeatable (see `stylesim describe FORMAT`)."
     ),
+    map: str = typer.Option(
+        "", "--map", help="Meanings of a table's columns (id=track,time=t,x=center_x,y=…), or the map file of a site."
+    ),
+    unit: str = typer.Option("", "--unit", help="Unit of a table's places: metres, feet, …, or metres per unit."),
     resume: bool = typer.Option(False, help="Go on from an unfinished run of the same request."),
 ) -> None:
     """Read a recorded data set into a new corpus; what was dropped is counted and said."""
     from stylesim.datasets.reading import read as run
 
+    options = options_of(option) | {name: value for name, value in (("map", map), ("unit", unit)) if value}
     with progress_bar(f"reading {format}", "scenes") as progress:
-        corpus = run(format, path, out=out, resume=resume, progress=progress, **options_of(option))
+        corpus = run(format, path, out=out, resume=resume, progress=progress, **options)
     show_table("Counted", ("what", "n"), sorted(corpus.manifest["counts"].items()))
     if format == "auto":
         say(f"recognised as {corpus.manifest['configuration']['format']}")

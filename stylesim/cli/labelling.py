@@ -15,6 +15,8 @@ from stylesim.labels import StyleLabels
 from stylesim.windows import WindowSpec
 
 if TYPE_CHECKING:
+    from stylesim.corpus import Corpus
+    from stylesim.labelers.base import Labeler
     from stylesim.labelers.scaler import FeatureScaler
 
 
@@ -23,6 +25,7 @@ class Method(StrEnum):
 
     tdbm = "tdbm"
     kdsc = "kdsc"
+    mdsi = "mdsi"
 
 
 class Span(StrEnum):
@@ -45,11 +48,37 @@ def _clamped(scaler: FeatureScaler, labels: StyleLabels) -> list[tuple[str, str,
     return [(name, f"{low:.3f}", f"{high:.3f}") for name, (low, high) in clamped_shares(scaler, labels).items()]
 
 
+def _labeler(method: Method, corpus: Corpus, fit: Path | None, window: float) -> Labeler:
+    """The labeller: fitted on a corpus, or the shipped one; MDSI takes the answers that the corpus carries."""
+    from stylesim.corpus import Corpus
+    from stylesim.labelers.mdsi import MDSI
+    from stylesim.labelers.reference import default_labeler, new_labeler
+    from stylesim.labelers.spans import SAME_LENGTH_S
+
+    if method is Method.mdsi:
+        answered = MDSI(norm="none" if fit is None else "sample", history_s=(window,))
+        answered.fit(corpus if fit is None else Corpus(fit))
+        if not answered.provenance_["drivers_with_answers"]:
+            raise InputError(f"{corpus.path}: no driver carries answers to the MDSI; read them with the format study")
+        return answered
+    if fit is None:
+        shipped = default_labeler(method.value)
+        if not any(abs(window - known) <= SAME_LENGTH_S for known in shipped.history_s):
+            known = ", ".join(f"{length:g}" for length in shipped.history_s)
+            raise InputError(
+                f"--window {window:g}: the shipped reference judges histories of {known} s; for another length fit "
+                f"on a corpus of your own: --fit CORPUS --window {window:g}"
+            )
+        return shipped
+    with progress_bar(f"fitting {method.value} on {fit.name}", "scenes") as progress:
+        return new_labeler(method.value, history_s=(window,)).fit(Corpus(fit), progress=progress)
+
+
 def label(
     corpus: Path = typer.Argument(help="A corpus."),
     method: Method = typer.Option(Method.tdbm, help="How to label."),
     fit: Path | None = typer.Option(
-        None, help="Corpus to fit scaler or clusters on; without it the shipped reference (never the judged corpus)."
+        None, help="Corpus to fit scaler, clusters or norm on; without it the shipped reference, and no norm for mdsi."
     ),
     window: float = typer.Option(
         WindowSpec().history_s, help="History in seconds of the window labels; with the shipped reference 1.1, 2 or 5."
@@ -60,23 +89,11 @@ def label(
     """Label every track, and every history window, by driving style."""
     from stylesim.corpus import Corpus
     from stylesim.labelers.labelling import label as run
-    from stylesim.labelers.reference import default_labeler, new_labeler
-    from stylesim.labelers.spans import SAME_LENGTH_S
     from stylesim.labelers.tdbm import TDBM
 
     spec = WindowSpec(window, future, stride)
     opened = Corpus(corpus)
-    if fit is None:
-        labeler = default_labeler(method.value)
-        if not any(abs(window - known) <= SAME_LENGTH_S for known in labeler.history_s):
-            known = ", ".join(f"{length:g}" for length in labeler.history_s)
-            raise InputError(
-                f"--window {window:g}: the shipped reference judges histories of {known} s; for another length fit "
-                f"on a corpus of your own: --fit CORPUS --window {window:g}"
-            )
-    else:
-        with progress_bar(f"fitting {method.value} on {fit.name}", "scenes") as progress:
-            labeler = new_labeler(method.value, history_s=(window,)).fit(Corpus(fit), progress=progress)
+    labeler = _labeler(method, opened, fit, window)
     with progress_bar(f"labelling {corpus.name} by {method.value}", "scenes") as progress:
         labels = run(opened, labeler, spec=spec, progress=progress)
     show_table(f"{method.value}: {len(labels)} tracks", ("style", "tracks", "share"), _shares(labels))

@@ -25,7 +25,7 @@ def read_road(root: Element, origin_m: Float64[np.ndarray, " 2"]) -> SiteMap | N
     """The road in metres from `origin_m`; None without lanelets. ValueError where the numbers make none.
 
     Speed limits are m/s: `speedLimit` of version 2018b, the value of a sign of version 2020a. Which lanelets lie in a
-    junction follows from the intersections (what their incoming lanelets lead to), or else from lanes that cross.
+    junction follows from the intersections (what their incoming lanelets lead to) and from lanes that cross.
     """
     elements = root.findall("lanelet")
     if not elements:
@@ -52,8 +52,8 @@ def read_road(root: Element, origin_m: Float64[np.ndarray, " 2"]) -> SiteMap | N
     if len({lane.lane_id for lane in lanes}) != len(lanes):
         raise ValueError("two lanelets have the same id")
     inside = set(_in_junctions(root))
-    marked = (
-        tuple(replace(lane, in_junction=lane.lane_id in inside) for lane in lanes) if inside else with_junctions(lanes)
+    marked = tuple(
+        replace(lane, in_junction=True) if lane.lane_id in inside else lane for lane in with_junctions(lanes)
     )
     known = {light.get("id", "") for light in root.findall("trafficLight")}
     return site_map(
