@@ -37,6 +37,7 @@ _HOME = {
     "evaluate": "stylesim.report.evaluate",
     "fidelity": "stylesim.evaluation.fidelity",
     "generate": "stylesim.simulation.generate",
+    "generate_from": "stylesim.simulation.rollout.generate",
     "label": "stylesim.labelers.labelling",
     "load_forecaster": "stylesim.forecasting.checkpoint",
     "merge": "stylesim.merging.merge",

@@ -7,6 +7,8 @@ from pathlib import Path
 import typer
 
 from stylesim.cli.console import progress_bar, say, show_table
+from stylesim.cli.continuing import continue_recording
+from stylesim.corpus import Corpus
 from stylesim.errors import InputError, unknown
 from stylesim.population import Population
 from stylesim.simulation.plan import EpisodePlan, TwinRequest, stressors_of
@@ -108,6 +110,12 @@ def generate(
         help="Unusual events at seeded moments, KIND or KIND:SHARE of the episodes, separated by commas: "
         "hard_brake, cut_in, jaywalker, deer, stalled, red_runner.",
     ),
+    from_: Path | None = typer.Option(
+        None, "--from", metavar="CORPUS", help="Instead of scenarios: recorded scenes that go on with styled drivers."
+    ),
+    scene: list[str] = typer.Option([], help="With --from: this scene, repeatable.", show_default="every scene"),
+    drivers: str = typer.Option("all", help="With --from: who is handed over: a,b,c by agent id, or all."),
+    at: float | None = typer.Option(None, min=0.0, help="With --from: when, in seconds of the scene."),
 ) -> None:
     """Generate traffic with drivers of chosen styles into a new corpus."""
     from stylesim.simulation.generate import generate as run
@@ -115,6 +123,27 @@ def generate(
     crowd = chosen_population(population, styles, reweight)
     if calibration is not None:
         crowd = crowd.calibrated(calibration)
+    if from_ is not None:
+        asked_for = {"a scenario": scenario, "--twins-at": twins_at, "--twins-from": twins_from}
+        asked_for |= {"--twin-style": twin_style, "--stressor": stressor, "--ego": ego, "--net": net, "--workers": workers > 1}
+        unused = [name for name, value in asked_for.items() if value not in (None, "", False, [])]
+        corpus = continue_recording(
+            from_,
+            crowd,
+            scenes=scene,
+            drivers=drivers,
+            at_s=at,
+            out=out,
+            episodes=episodes,
+            seed=seed,
+            resume=resume,
+            unused=unused,
+        )
+        _show_counts(corpus, crowd)
+        say(f"{len(corpus)} scenes, {corpus.manifest['n_steps']} agent-steps: {out}")
+        return
+    if scene or at is not None or drivers != "all":
+        raise InputError("--scene, --drivers and --at say what of a recording goes on; name it with --from CORPUS")
     twins = wanted_twins(twins_at, twins_from, twin_style, null=twin_null)
     plan = EpisodePlan(stressors=stressors_of(stressor) if stressor else (), ego=ego)
     names = wanted_scenarios(scenario or [], net, demand, vph)
@@ -131,6 +160,13 @@ def generate(
             twins=twins,
             progress=progress,
         )
+    _show_counts(corpus, crowd)
+    paired = f" ({sum(bool(info.twin_of) for info in corpus.info)} of them twins)" if twins is not None else ""
+    say(f"{len(corpus)} episodes{paired}, {corpus.manifest['n_steps']} vehicle-steps: {out}")
+
+
+def _show_counts(corpus: Corpus, crowd: Population) -> None:
+    """Drivers by style, and whatever else was counted."""
     counts = corpus.manifest["counts"]
     styles_asked = ("neutral",) if crowd.within_class == "neutral" else STYLE_CLASSES
     drivers = {name: counts.get(f"drivers.{name}", 0) for name in styles_asked}
@@ -141,8 +177,6 @@ def generate(
     others = {key: n for key, n in sorted(counts.items()) if not key.startswith("drivers.") and n}
     if others:
         show_table("Counted", ("what", "n"), list(others.items()))
-    paired = f" ({sum(bool(info.twin_of) for info in corpus.info)} of them twins)" if twins is not None else ""
-    say(f"{len(corpus)} episodes{paired}, {corpus.manifest['n_steps']} vehicle-steps: {out}")
 
 
 def add_to(app: typer.Typer) -> None:
