@@ -124,8 +124,14 @@ def generate(
     if calibration is not None:
         crowd = crowd.calibrated(calibration)
     if from_ is not None:
-        asked_for = {"a scenario": scenario, "--twins-at": twins_at, "--twins-from": twins_from}
-        asked_for |= {"--twin-style": twin_style, "--stressor": stressor, "--ego": ego, "--net": net, "--workers": workers > 1}
+        asked_for = {"a scenario": scenario, "--net": net, "--twins-at": twins_at, "--twins-from": twins_from}
+        asked_for |= {
+            "--twin-style": twin_style,
+            "--stressor": stressor,
+            "--ego": ego,
+            "--net": net,
+            "--workers": workers > 1,
+        }
         unused = [name for name, value in asked_for.items() if value not in (None, "", False, [])]
         corpus = continue_recording(
             from_,
