@@ -17,15 +17,19 @@ BEHIND_SHARE = 0.8  # chosen: centres further apart than this share of the half 
 LOOK_BACK_S = 1.0  # chosen: who moved over within the last second
 FRONT_SHARE = 0.5  # chosen: a contact in the foremost quarter of a car's length is at its front
 
-RAN_RED, REAR_END, SIDEWAYS, INTO_SIDE, UNDECIDED = "ran red", "rear end", "sideways", "front into side", "undecided"
+STANDING_MPS = 0.5  # chosen: who rolls so slowly was run into
+
+RAN_RED, REAR_END, SIDEWAYS = "ran red", "rear end", "sideways"
+INTO_SIDE, INTO_STANDING, UNDECIDED = "front into side", "into one that stands", "undecided"
 
 
 @dataclass(frozen=True)
 class Collision:
     """Two agents (places in the scene) whose boxes first overlap at `frame`.
 
-    `charged` are those whose doing it is: the one that ran a red light; driving the same way, the one behind, or the
-    one that moved over; crossing, the one whose front hit the other's side. Both where that does not decide it.
+    `charged` are those whose doing it is: driving the same way, the one behind, or the one that moved over; crossing,
+    the one that ran a red light, whose front hit the other's side, or who ran into one that stands. Both where that
+    does not decide it.
     `under_stressor`: one of them did or met something unusual on purpose (a stressor of the episode) before.
     """
 
@@ -76,16 +80,19 @@ def _stress_from(scene: Scene) -> dict[str, float]:
 
 def _attributed(tracks: Tracks, a: int, b: int, frame: int) -> tuple[str, tuple[int, ...]]:
     """How they met, and who is charged."""
-    red = tracks.flagged(TrackFlag.RAN_RED)
-    if red[a] != red[b]:
-        return RAN_RED, (a if red[a] else b,)
     turn = abs(float(wrap_angle(np.asarray(tracks.heading_rad[b, frame] - tracks.heading_rad[a, frame], np.float64))))
     if turn < SAME_WAY_RAD:
         return _same_way(tracks, a, b, frame)
+    red = tracks.flagged(TrackFlag.RAN_RED)  # at any light of the trip: the flag has no time
+    if red[a] != red[b]:
+        return RAN_RED, (a if red[a] else b,)
     reach = [_contact_ahead(tracks, one, other, frame) for one, other in ((a, b), (b, a))]
     at_front = [share >= FRONT_SHARE for share in reach]
     if at_front[0] != at_front[1]:
         return INTO_SIDE, (a if at_front[0] else b,)
+    stands = tracks.speed_mps[[a, b], frame] < STANDING_MPS
+    if stands[0] != stands[1]:
+        return INTO_STANDING, (b if stands[0] else a,)
     return UNDECIDED, (a, b)
 
 

@@ -13,7 +13,15 @@ from scipy.stats import chi2
 
 from stylesim.corpus import Corpus, CorpusWriter
 from stylesim.errors import InputError
-from stylesim.evaluation.collisions import INTO_SIDE, RAN_RED, REAR_END, SIDEWAYS, UNDECIDED, collisions_of
+from stylesim.evaluation.collisions import (
+    INTO_SIDE,
+    INTO_STANDING,
+    RAN_RED,
+    REAR_END,
+    SIDEWAYS,
+    UNDECIDED,
+    collisions_of,
+)
 from stylesim.evaluation.criticality import criticality, quantile_estimate
 from stylesim.evaluation.driver_criticality import drivers_criticality
 from stylesim.evaluation.exposure import driver_weights, event_rate, style_weights
@@ -89,6 +97,20 @@ def test_into_the_side_and_through_the_red():
     assert (one.how, one.charged) == (RAN_RED, (0,))
     (one,), _ = collisions_of(crossing_scene(0.0))
     assert (one.how, one.charged) == (UNDECIDED, (0, 1))
+
+
+def test_who_runs_into_one_that_stands():
+    oncoming = np.stack([60.0 - 10.0 * T, np.full(len(T), 1.0)], axis=1)
+    (one,), _ = collisions_of(scene_of([oncoming, straight(0.0, 0.0)], headings=[np.pi, 0.0]))
+    assert (one.how, one.charged) == (INTO_STANDING, (0,))
+
+
+def test_a_red_light_is_no_excuse_for_who_follows_too_closely():
+    scene = driven(
+        scene_of([straight(0.0, 15.0), straight(30.0, 12.0)], road=lanes(1)), [1.0, 0.6], [0, int(TrackFlag.RAN_RED)]
+    )
+    (one,), _ = collisions_of(scene)
+    assert (one.how, one.charged) == (REAR_END, (0,))
 
 
 def test_nobody_is_charged_under_a_stressor(tmp_path):
