@@ -20,8 +20,6 @@ GENTLE_MPS2 = 1.0  # chosen: least braking of who yields, so that it comes to re
 
 def lanes_ahead(vehicle: Any) -> Iterator[tuple[float, AbstractLane]]:
     """(distance of its start from the vehicle, lane) for the lanes that follow on its route, nearest first."""
-    if not vehicle.route:
-        return
     road, index = vehicle.road, vehicle.target_lane_index
     start = road.graph.length_m[index] - road.place(vehicle, index)[0]
     for _ in range(LANES_AHEAD):
@@ -53,7 +51,7 @@ def curve_speed_mps(vehicle: Any, comfort_mps2: float) -> float:
     v = sqrt(a r) in a curve of radius r; sqrt(v^2 + 2 a d) at distance d before it. The longitudinal comfort is
     taken for the lateral one too (a friction circle) [ours]. Infinite on straight roads.
     """
-    if not getattr(vehicle, "route", None) or not vehicle.road.graph.winds:
+    if not vehicle.road.graph.winds:
         return math.inf
     here = vehicle.road.network.get_lane(vehicle.target_lane_index)
     result = math.sqrt(comfort_mps2 * bend_radius_m(here))

@@ -66,6 +66,8 @@ class StyledRoad(Road):  # type: ignore[misc]
         for vehicle, number in zip(self.vehicles, lanes.closest(), strict=False):
             if getattr(vehicle, "lane_from_road", False):
                 vehicle.lane_index, vehicle.lane = lanes.index[number], lanes.lane[number]
+                if self.record_history:
+                    vehicle.history.appendleft(vehicle.create_from(vehicle))
         if len(self.vehicles) > 1:
             for i, j in np.argwhere(self._may_touch(dt)):
                 self.vehicles[i].handle_collisions(self.vehicles[j], dt)

@@ -15,6 +15,7 @@ LANE_ANGLE_RAD = 0.35  # chosen: largest angle to the lane; highway-env's 45 deg
 WHEEL_RAD = 0.7  # chosen: lock of the front wheels; with highway-env's geometry a turning radius of 6.4 m
 WHEEL_RAD_PS = 2.0  # chosen: how fast a driver turns them; without a limit the lateral velocity jumps
 LATERAL_MPS2 = 3.8  # chosen, because 4 m/s2 is what people accept at most, and discretisation adds a little
+BEND_MARGIN = 1.3  # chosen: over what the bend itself takes, so that the car can come back to the centre
 SLOW_MPS = 0.01  # as highway-env's not_zero
 
 
@@ -36,7 +37,8 @@ def steering_rad(car: Any, lane: Any, *, place_m: float, rate_mps: float, along_
     slip_in_bend = math.asin(min(max(car.LENGTH / 2 * bend, -0.5), 0.5))
     ahead = lane.heading_at(along_m + car.speed * HEADING_S) - slip_in_bend
     turn = wrapped(ahead + math.asin(min(max(command, -reach), reach)) - car.heading) / HEADING_S
-    largest = LATERAL_MPS2 / max(speed, 1.0)
+    car.lateral_mps2 = max(LATERAL_MPS2, BEND_MARGIN * abs(bend) * speed**2)  # who entered a bend too fast holds on
+    largest = car.lateral_mps2 / max(speed, 1.0)
     turn = min(max(turn, -largest), largest)
     slip = math.asin(min(max(car.LENGTH / 2 / speed * turn, -1.0), 1.0))
     steering = math.atan(2 * math.tan(slip))
@@ -54,7 +56,7 @@ def turned_wheel_rad(wheel_rad: float, wish_rad: float, car: Any, dt: float) -> 
     speed = max(car.speed, 1.0)
     before, wanted = math.atan(math.tan(wheel_rad) / 2), math.atan(math.tan(wheel) / 2)
     kept, weight = speed * before / dt, speed * speed / (car.LENGTH / 2) + speed / dt
-    slip = min(max(wanted, (kept - LATERAL_MPS2) / weight), (kept + LATERAL_MPS2) / weight)
+    slip = min(max(wanted, (kept - car.lateral_mps2) / weight), (kept + car.lateral_mps2) / weight)
     return wheel if slip == wanted else math.atan(2 * math.tan(slip))
 
 

@@ -15,10 +15,11 @@ from stylesim.simulation.highway.lane_choice import Needs, choose_lane, must_cha
 from stylesim.simulation.highway.noise import Wander
 from stylesim.simulation.highway.path import braking_to_yield_mps2, curve_speed_mps
 from stylesim.simulation.highway.pedal import TYRES_MPS2, Pedal
-from stylesim.simulation.highway.steering import WHEEL_RAD, LaneKeeping, steering_rad, turned_wheel_rad
+from stylesim.simulation.highway.steering import LATERAL_MPS2, WHEEL_RAD, LaneKeeping, steering_rad, turned_wheel_rad
 from stylesim.style import DriverStyle
 
 TOP_SPEED_MPS = 60.0  # chosen, because highway-env's 40 m/s would cut off the wish of bold drivers
+UNKNOWN_LIMIT_MPS = 20.0  # highway-env's default, for lanes of users that have none
 LANE_WIDTH_M = 4.0  # highway-env's; what wander may use of it depends on the car's width
 KERB_M = 0.2  # what wander leaves between the car's side and the lane's edge
 LANE_END_M = 15.0  # chosen: who must stop at the end of its lane leaves that much to pull away
@@ -50,6 +51,7 @@ class StyledVehicle(IDMVehicle):  # type: ignore[misc]
         self.waits_for_gap = False  # set by the junction's right of way
         self.stop_ahead_m = math.inf  # to where it has decided to stop, from its front bumper; set by the lights
         self.emergency_braked = False
+        self.lateral_mps2 = LATERAL_MPS2  # accepted now
         self._wheel_rad = 0.0
         self._was_yielding = False
         self._hesitation_s = 0.0
@@ -84,8 +86,10 @@ class StyledVehicle(IDMVehicle):  # type: ignore[misc]
             return float(min(max(self.target_speed, 0.0), self.lane.speed_limit))
         if self.waits_for_gap or self._hesitation_s > 0 or getattr(self, "is_yielding", False):
             return 0.0
-        limit = self.style.desired_speed_factor * self.lane.speed_limit
-        return min(limit, curve_speed_mps(self, self.style.comfortable_deceleration_mps2)) if self.route else limit
+        limit = self.style.desired_speed_factor * (self.lane.speed_limit or UNKNOWN_LIMIT_MPS)
+        if not self.road.graph.winds:
+            return limit
+        return min(limit, curve_speed_mps(self, self.style.comfortable_deceleration_mps2))
 
     def stand_at(self, index: tuple[str, str, int], along_m: float) -> None:
         """Put the car onto the centre of a lane, along it."""
