@@ -29,7 +29,7 @@ _HOME = {
     "StyleLabels": "stylesim.labels",
     "StylesimError": "stylesim.errors",
     "SUMO_OPTIONS": "stylesim.plugins.populate",
-    "StyledTraffic": "stylesim.plugins.styled_traffic",
+    "StyledTraffic": "stylesim.envs.styled_traffic",
     "TDBM": "stylesim.labelers.tdbm",
     "Tracks": "stylesim.tracks",
     "WindowSpec": "stylesim.windows",

@@ -6,6 +6,7 @@ from collections.abc import Mapping
 
 from stylesim.simulation.highway.junction import JunctionTraffic
 from stylesim.simulation.highway.open_traffic import OpenTraffic
+from stylesim.simulation.highway.roundabout import roundabout_site
 from stylesim.simulation.highway.sites import SITES
 from stylesim.simulation.highway.spec import HighwayOptions
 from stylesim.simulation.highway.traffic import Crew, Traffic, highway_traffic
@@ -17,4 +18,5 @@ def traffic_of(options: HighwayOptions, drawn: Mapping[str, float], crew: Crew, 
         return highway_traffic(options, drawn, crew, time_s=time_s)
     if options.layout == "intersection":
         return JunctionTraffic(options, drawn, crew)
-    return OpenTraffic(SITES[options.layout](drawn), options, crew, time_s=time_s)
+    site = roundabout_site(drawn) if options.layout == "roundabout" else SITES[options.layout](drawn)
+    return OpenTraffic(site, options, crew, time_s=time_s)

@@ -25,6 +25,7 @@ SETTLING_S = 3.0  # after insertion, not logged: cars find their speed and gap i
 LAST_ENTRY_S = 27.0  # nobody enters later than that before the end, so that everybody is seen for 20 s and more
 ENTRY_HEADWAY_S = 1.5  # who wants more than that behind its leader opens the gap after it has entered
 ENTRY_FASTER_MPS = 3.0  # at most that much faster than the leader at the entry
+LOOK_EVERY_S = 0.2  # how often drivers look for a gap; chosen: a glance
 LEAVES_M = 8.0  # before the end of its last lane a car has arrived
 MISSED_M = 5.0  # who is that close to the fork and not in its lane goes on where its lane leads
 
@@ -42,6 +43,7 @@ class OpenTraffic(Traffic):
         self._entered: dict[str, int] = {}  # driver -> step of its insertion; who stood there at the start is not in it
         self._waiting: dict[Edge, deque[StyledVehicle]] = {edge: deque() for edge in site.arrivals_per_s}
         self.lights = self._lights()
+        self._rule = site.rule(road.graph) if site.rule is not None else None
         self._due: list[tuple[float, Edge, int]] = []
         self._placed: list[tuple[float, LaneIndex, float]] = []
         if self.lights is not None and options.arrivals == "dilemma":
@@ -133,6 +135,8 @@ class OpenTraffic(Traffic):
         """One simulation step, then cars leave and enter."""
         if self.lights is not None:
             self.lights.before_step(self._step * self._dt, self.road)
+        if self._rule is not None and self._step % round(LOOK_EVERY_S / self._dt) == 0:
+            self._rule.assign(self.road.vehicles)
         super().advance()
         self._step += 1
         self._leave()

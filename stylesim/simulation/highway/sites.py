@@ -8,14 +8,16 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from typing import Any
 
 from highway_env.road.lane import AbstractLane, LineType, SineLane, StraightLane
 from highway_env.road.road import RoadNetwork
 
+from stylesim.simulation.highway.graph import LaneGraph
 from stylesim.simulation.highway.lights import Programme
 
 LANE_M = StraightLane.DEFAULT_WIDTH
-RAMP_LIMIT_MPS = 80 / 3.6  # usual on ramps between motorways and main roads
+RAMP_LIMIT_MPS = 100 / 3.6  # usual on the ramps between two motorways; those to main roads have 60 to 80 km/h
 ASIDE_M = 6.5  # of a ramp from the lane that it joins; highway-env's merge-v0 has the same
 SLIP_M = 120.0  # over which a ramp comes alongside; chosen: 1.4 m/s2 across at 25 m/s
 # Chosen: the German rules (RAA) ask for 250 m of acceleration and deceleration lane.
@@ -43,6 +45,7 @@ class Site:
     filled_m: Mapping[Edge, float]
     junction_nodes: str = ""
     light: Programme | None = None  # at the end of the lanes that lead into the junction
+    rule: Callable[[LaneGraph], Any] | None = None  # who must wait there; `assign(cars)` sets their `waits_for_gap`
 
 
 def lanes_beside(
