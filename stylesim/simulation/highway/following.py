@@ -1,10 +1,11 @@
-"""How hard a driver brakes for whom it follows: the IDM, with a cool head where a gap is small but nothing at stake."""
+"""How hard a driver brakes for whom it follows: the improved IDM, cool where a gap is small but nothing at stake."""
 
 from __future__ import annotations
 
 import math
 
 COOLNESS = 0.99  # Kesting, Treiber, Helbing 2010 [recalled]
+LEAST_FREE_MPS2 = 1e-3  # below it the driver goes as fast as it wishes
 LEAST_GAP_M = 0.1  # nearer than that counts as that near
 
 
@@ -26,15 +27,22 @@ def behind_leader(
     bold: float,
     ease: float,
 ) -> float:
-    """IDM acceleration behind a leader (Treiber et al. 2000 [recalled]), tempered by `cool`, m/s2.
+    """Improved IDM acceleration behind a leader (Treiber and Kesting 2013 [recalled]), tempered by `cool`, m/s2.
 
-    `free` is the acceleration without the leader, the gap is bumper to bumper, the leader's speed and acceleration
+    Unlike the IDM of 2000 it keeps the wished speed up to the wished gap: with it a driver who wants a far gap would
+    crawl behind somebody 200 m ahead. `free` is the acceleration without the leader, the gap is bumper to bumper, the leader's speed and acceleration
     are along the driver's own direction.
     """
     gap_m = max(gap_m, LEAST_GAP_M)
     closing = speed_mps - leader_speed_mps
     wanted = standing_m + speed_mps * headway_s + speed_mps * closing / (2.0 * math.sqrt(bold * ease))
-    idm = free - bold * (max(wanted, standing_m) / gap_m) ** 2
+    share = max(wanted, standing_m) / gap_m
+    if share >= 1.0:
+        idm = min(free, 0.0) + bold * (1.0 - share * share)
+    elif free > LEAST_FREE_MPS2:
+        idm = free * (1.0 - share ** (2.0 * bold / free))
+    else:
+        idm = free
     return min(free, cool(idm, speed_mps, leader_speed_mps, leader_mps2, gap_m, bold=bold, ease=ease))
 
 

@@ -22,7 +22,6 @@ from stylesim.simulation.highway.vehicle import StyledVehicle
 from stylesim.tracks import TrackFlag
 
 SETTLING_S = 3.0  # after insertion, not logged: cars find their speed and gap in that time (as in the other simulator)
-LAST_ENTRY_S = 27.0  # nobody enters later than that before the end, so that everybody is seen for 20 s and more
 ENTRY_HEADWAY_S = 1.5  # who wants more than that behind its leader opens the gap after it has entered
 ENTRY_FASTER_MPS = 3.0  # at most that much faster than the leader at the entry
 LOOK_EVERY_S = 0.2  # how often drivers look for a gap; chosen: a glance
@@ -47,14 +46,14 @@ class OpenTraffic(Traffic):
         self._due: list[tuple[float, Edge, int]] = []
         self._placed: list[tuple[float, LaneIndex, float]] = []
         if self.lights is not None and options.arrivals == "dilemma":
-            self._placed = dilemmas(self.lights, rng=crew.stream("demand"), until_s=time_s - LAST_ENTRY_S)
+            self._placed = dilemmas(self.lights, rng=crew.stream("demand"), until_s=time_s - site.last_entry_s)
         else:
             self._due = arrivals(
                 site.arrivals_per_s,
                 self._ways,
                 road.graph.beside,
                 rng=crew.stream("demand"),
-                until_s=time_s - LAST_ENTRY_S,
+                until_s=time_s - site.last_entry_s,
             )
             self._fill(crew.stream("placement"))
 

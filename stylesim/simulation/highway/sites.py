@@ -45,6 +45,7 @@ class Site:
     filled_m: Mapping[Edge, float]
     junction_nodes: str = ""
     light: Programme | None = None  # at the end of the lanes that lead into the junction
+    last_entry_s: float = 27.0  # nobody enters later than that before the end: everybody is seen for 20 s or more
     rule: Callable[[LaneGraph], Any] | None = None  # who must wait there; `assign(cars)` sets their `waits_for_gap`
 
 
@@ -75,9 +76,9 @@ def _slip(start: tuple[float, float], end: tuple[float, float], limit_mps: float
 
 
 def merge_site(drawn: Mapping[str, float]) -> Site:
-    """A motorway with an on-ramp: 700 m, 250 m of acceleration lane, and on to 2,500 m."""
+    """A motorway with an on-ramp: 700 m, 250 m of acceleration lane, and on to 4,000 m."""
     lanes, limit = round(drawn["lanes"]), drawn["speed_limit_mps"]
-    joint, end, out = 700.0, 700.0 + ACCELERATION_LANE_M, 2500.0
+    joint, end, out = 700.0, 700.0 + ACCELERATION_LANE_M, 4000.0
     y = lanes * LANE_M
     network = RoadNetwork()
     lanes_beside(network, ("in", "joint"), (0.0, joint), lanes=lanes, limit_mps=limit)
@@ -97,14 +98,15 @@ def merge_site(drawn: Mapping[str, float]) -> Site:
         network,
         (Trip(through), Trip(entering)),
         arrivals_per_s={("in", "joint"): flow * (1 - share), ("ramp", "slip"): flow * share},
-        filled_m={("in", "joint"): 1200.0, ("ramp", "slip"): 250.0},
+        filled_m={("in", "joint"): 1800.0, ("ramp", "slip"): 250.0},
+        last_entry_s=45.0,
     )
 
 
 def exit_site(drawn: Mapping[str, float]) -> Site:
-    """A motorway with an off-ramp: 1,500 m, 250 m of deceleration lane, and on to 2,500 m or 650 m down the ramp."""
+    """A motorway with an off-ramp: 2,500 m, 250 m of deceleration lane, and on to 4,000 m, or down the ramp."""
     lanes, limit = round(drawn["lanes"]), drawn["speed_limit_mps"]
-    begin, fork, out = 1500.0, 1500.0 + DECELERATION_LANE_M, 2500.0
+    begin, fork, out = 2500.0, 2500.0 + DECELERATION_LANE_M, 4000.0
     y = lanes * LANE_M
     network = RoadNetwork()
     lanes_beside(network, ("in", "begin"), (0.0, begin), lanes=lanes, limit_mps=limit)
@@ -124,7 +126,8 @@ def exit_site(drawn: Mapping[str, float]) -> Site:
         network,
         (Trip(through, 1 - share), Trip(leaving, share)),
         arrivals_per_s={("in", "begin"): flow},
-        filled_m={("in", "begin"): 1200.0},
+        filled_m={("in", "begin"): 1800.0},
+        last_entry_s=45.0,
     )
 
 

@@ -21,6 +21,7 @@ from stylesim.style import DriverStyle
 TOP_SPEED_MPS = 60.0  # chosen, because highway-env's 40 m/s would cut off the wish of bold drivers
 UNKNOWN_LIMIT_MPS = 20.0  # highway-env's default, for lanes of users that have none
 LANE_WIDTH_M = 4.0  # highway-env's; what wander may use of it depends on the car's width
+OTHERS_HEADWAY_S = 1.5  # of others one expects what the neutral driver keeps, at most (agents/styles.yaml)
 KERB_M = 0.2  # what wander leaves between the car's side and the lane's edge
 LANE_END_M = 15.0  # chosen: who must stop at the end of its lane leaves that much to pull away
 
@@ -141,7 +142,7 @@ class StyledVehicle(IDMVehicle):  # type: ignore[misc]
                 leader.speed * turned,
                 getattr(leader, "acceleration_mps2", 0.0) * turned,
                 gap_m,
-                headway_s=style.time_headway_s,
+                headway_s=style.time_headway_s if car is self else min(style.time_headway_s, OTHERS_HEADWAY_S),
                 standing_m=style.min_gap_m,
                 bold=bold,
                 ease=ease,
