@@ -30,8 +30,8 @@ def behind_leader(
     """Improved IDM acceleration behind a leader (Treiber and Kesting 2013 [recalled]), tempered by `cool`, m/s2.
 
     Unlike the IDM of 2000 it keeps the wished speed up to the wished gap: with it a driver who wants a far gap would
-    crawl behind somebody 200 m ahead. `free` is the acceleration without the leader, the gap is bumper to bumper, the leader's speed and acceleration
-    are along the driver's own direction.
+    crawl behind somebody 200 m ahead. `free` is the acceleration without the leader, the gap is bumper to bumper, the
+    leader's speed and acceleration are along the driver's own direction.
     """
     gap_m = max(gap_m, LEAST_GAP_M)
     closing = speed_mps - leader_speed_mps
