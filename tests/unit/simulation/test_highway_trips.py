@@ -53,7 +53,7 @@ def test_lanes_join_and_lead_somewhere(layout):
 
 
 def test_who_is_on_the_ramp_merges_before_its_lane_ends():
-    crowd = traffic("merge", time_s=40.0, density_per_km_lane=5.0, ramp_share=0.5)
+    crowd = traffic("merge", time_s=63.0, density_per_km_lane=5.0, ramp_share=0.5)
     entering = {}
     for step in range(450):
         crowd.advance()
@@ -65,7 +65,7 @@ def test_who_is_on_the_ramp_merges_before_its_lane_ends():
 
 
 def test_who_leaves_takes_the_ramp_and_who_stays_does_not():
-    crowd = traffic("exit", time_s=27.0, density_per_km_lane=4.0, lanes=2.0, exit_share=0.5)
+    crowd = traffic("exit", time_s=45.0, density_per_km_lane=4.0, lanes=2.0, exit_share=0.5)
     cars = {car.driver_id: car for car in crowd.road.vehicles}
     leaving = {name for name, car in cars.items() if car.route[-1][1] == "ramp"}
     assert len(leaving) >= 3
