@@ -2,10 +2,10 @@
 
     python -m benchmarks.highway_speed [--vehicles 20 50 100] [--seconds 10] [--repeats 3]
 
-Three ways through the same straight motorway of four lanes at 10 Hz: highway-env as it comes (its Road, its IDMVehicle),
-highway-env's cars on our road (only the searches differ), and styled drivers on our road (what `generate` runs). Printed
-are vehicle-steps per second, median of the repeats with the range, and the ratio to the first. The searches themselves are
-compared with highway-env's answers in tests/reference/test_highway_env_searches.py.
+Three ways through the same straight motorway of four lanes at 10 Hz: highway-env as it comes (its Road and IDMVehicle),
+its cars on our road (only the searches differ), and styled drivers on our road (what `generate` runs). Printed are
+vehicle-steps per second, median of the repeats with the range, and the ratio to the first. The searches are compared
+with highway-env's answers in tests/reference/test_highway_env_searches.py.
 """
 
 from __future__ import annotations
@@ -84,9 +84,7 @@ def main() -> None:
     parser.add_argument("--seconds", type=float, default=10.0)
     parser.add_argument("--repeats", type=int, default=3)
     asked = parser.parse_args()
-    print(
-        f"{'vehicles':>9} {'way':<20} {'vehicle-steps/s':>16} {'range':>16} {'ratio':>6}   (n = {asked.repeats} repeats)"
-    )
+    print(f"{'vehicles':>9} {'way':<20} {'vehicle-steps/s':>16} {'range':>16} {'ratio':>6}   (n = {asked.repeats})")
     for vehicles in asked.vehicles:
         found: dict[str, list[float]] = {name: [] for name in WAYS}
         for _ in range(asked.repeats):  # in turn, so that what else the machine does falls on all alike
