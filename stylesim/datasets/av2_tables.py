@@ -52,7 +52,8 @@ def table_of(file: Path) -> AvTable:
     single = [_once(table, name, file) for name in _SINGLE]
     columns = [table[name].to_numpy() for name in _NUMBERS]
     numbers = np.stack([np.asarray(column, np.float64) for column in columns], -1)
-    frame = np.asarray(table["timestep"].fill_null(-1).to_numpy(), np.int64)
+    steps = table["timestep"]
+    frame = (steps.fill_null(-1) if steps.null_count() else steps).to_numpy().astype(np.int64)
     readable = np.isfinite(numbers).all(axis=1)
     for name in _IDS:
         if table[name].null_count():
@@ -100,10 +101,10 @@ def _plausible(
 
 def _once(table: pl.DataFrame, name: str, file: Path) -> str:
     """What stands in every row of that column."""
-    values = table[name].unique()
-    if len(values) > 1:
-        raise InputError(f"{file} holds {len(values)} values of {name}; a scenario has one")
-    value = values[0] if len(values) else None
+    column = table[name]
+    if column.n_unique() > 1:
+        raise InputError(f"{file} holds {column.n_unique()} values of {name}; a scenario has one")
+    value = column[0] if len(column) else None
     if value is None and name == "scenario_id":
         raise InputError(f"{file} has no scenario_id, or no row")
     return str(value or "")
