@@ -18,6 +18,7 @@ from stylesim.evaluation.realism_quantities import (
     BINS,
     CELLS,
     QUANTITIES,
+    Quantity,
     cells_of,
     moving_vehicles,
     quantities_of,
@@ -101,6 +102,11 @@ def _between_vehicles(scene: Scene, first: int, second: int) -> bool:
     return bool(scene.tracks.is_motor[first] and scene.tracks.is_motor[second])
 
 
+def bins_of(value: Float64[np.ndarray, " frame"], quantity: Quantity) -> Int64[np.ndarray, " frame"]:
+    """The bin of each value; what lies beyond the span (however far) counts in the first or last."""
+    return np.asarray(np.clip((value - quantity.low) / quantity.width, 0, BINS - 1).astype(np.int64))
+
+
 def _add(
     scene: Scene,
     judge: TDBM,
@@ -122,7 +128,7 @@ def _add(
     for k, (name, value) in enumerate(quantities_of(scene, follow).items()):
         quantity = QUANTITIES[name]
         use = moving & np.isfinite(value)
-        where = np.clip(((value[use] - quantity.low) / quantity.width).astype(np.int64), 0, BINS - 1)
+        where = bins_of(value[use], quantity)
         flat = np.bincount(place[use] * BINS + where, minlength=len(STYLES) * CELLS * BINS)
         histogram[:, :, k] += dt_s * flat.reshape(len(STYLES), CELLS, BINS)
         if name == "acceleration":

@@ -16,7 +16,7 @@ from stylesim.corpus import Corpus, CorpusWriter
 from stylesim.errors import InputError
 from stylesim.evaluation import distances
 from stylesim.evaluation.realism import POOLED, realism
-from stylesim.evaluation.realism_profile import profile_of
+from stylesim.evaluation.realism_profile import bins_of, profile_of
 from stylesim.evaluation.realism_quantities import BINS, CELLS, QUANTITIES
 from stylesim.labelers.reference import default_labeler
 from stylesim.report.realism_page import save_realism
@@ -125,6 +125,12 @@ def test_a_profile_holds_every_moving_second(folder):
     seconds = sum(scene.tracks.valid.sum() * 0.1 for scene in corpus)
     assert profile.pooled()[..., 0, :].sum() == pytest.approx(seconds)
     assert profile.drivers.sum() == 36
+
+
+def test_values_beyond_the_span_count_in_its_last_bin():
+    """Two cars that close in by a rounding error have a time to collision of 1e300 s."""
+    found = bins_of(np.array([1e300, 23.99, 24.0, 0.1, -1e300]), QUANTITIES["ttc"])
+    assert found.tolist() == [BINS - 1, BINS - 1, BINS - 1, 0, 0]
 
 
 def test_the_edge_of_the_road_is_beyond_the_neighbouring_lanes(tmp_path):
