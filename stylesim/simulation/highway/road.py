@@ -12,6 +12,7 @@ from highway_env.road.road import Road
 from highway_env.vehicle.objects import Landmark
 from jaxtyping import Bool
 
+from stylesim.simulation.highway.flow_sense import LOOKS_EVERY_S, look_around
 from stylesim.simulation.highway.graph import LaneGraph, LaneIndex
 from stylesim.simulation.highway.path import ALIGNED_RAD, LANES_AHEAD, STANDING_MPS
 from stylesim.simulation.highway.projection import Projection
@@ -44,6 +45,7 @@ class StyledRoad(Road):  # type: ignore[misc]
         self._cars: list[Any] | None = None
         self._on_lane: dict[Any, tuple[list[float], list[Any]]] = {}
         self._reaching: list[list[bool]] | None = None
+        self._since_look_s = 0.0
         self._moving = False  # inside act and step, where nobody else moves anybody
         self.in_step = False  # cars leave their closest lane to the road then
 
@@ -51,12 +53,16 @@ class StyledRoad(Road):  # type: ignore[misc]
         """Let everybody decide."""
         self._refresh()
         self._on_lane = {}
+        if self._since_look_s >= LOOKS_EVERY_S - 1e-9:
+            self._since_look_s = 0.0
+            look_around(self.vehicles)
         self._moving = True
         super().act()
         self._moving = False
 
     def step(self, dt: float) -> None:
         """Move every car, find its closest lane, then let the pairs that could touch check for a collision."""
+        self._since_look_s += dt
         self.in_step = True
         for vehicle in self.vehicles:
             vehicle.step(dt)

@@ -46,6 +46,7 @@ class StyledVehicle(IDMVehicle):  # type: ignore[misc]
         self.driver_id = ""
         self.style: DriverStyle | None = None
         self.needs: Needs | None = None  # lane changes that its route asks for
+        self.flow_ratio = 1.0  # what it makes of its wish in view of the traffic around
         self.acceleration_mps2 = 0.0  # what the car does, after lag, noise and tyres
         self.slip_rad = 0.0  # angle between its course and its body
         self.crashed_s = 0.0
@@ -87,10 +88,16 @@ class StyledVehicle(IDMVehicle):  # type: ignore[misc]
             return float(min(max(self.target_speed, 0.0), self.lane.speed_limit))
         if self.waits_for_gap or self._hesitation_s > 0 or getattr(self, "is_yielding", False):
             return 0.0
-        limit = self.style.desired_speed_factor * (self.lane.speed_limit or UNKNOWN_LIMIT_MPS)
+        limit = self.free_wish_mps * self.flow_ratio
         if not self.road.graph.winds:
             return limit
         return min(limit, curve_speed_mps(self, self.style.comfortable_deceleration_mps2))
+
+    @property
+    def free_wish_mps(self) -> float:
+        """What the driver would drive here if nobody else was about."""
+        factor = 1.0 if self.style is None else self.style.desired_speed_factor
+        return float(factor * (self.lane.speed_limit or UNKNOWN_LIMIT_MPS))
 
     def stand_at(self, index: tuple[str, str, int], along_m: float) -> None:
         """Put the car onto the centre of a lane, along it."""

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -150,3 +152,18 @@ def test_two_cars_that_touch_are_one_collision():
     drive(on, 2)
     assert vehicle.crashed
     assert len(on.collided_pairs) == 1
+
+
+def test_who_looks_at_others_drives_by_what_they_drive():
+    """With the whole wish taken from the traffic around, 10 % more than the neighbours drive, within the bounds."""
+    on = road(2)
+    for at in (0.0, 30.0, 60.0):
+        neighbour = car(on, "careful", at, lane=1)
+        neighbour.style = replace(neighbour.style, desired_speed_factor=0.95)
+    vehicle = car(on, "careful", 20.0)
+    vehicle.style = replace(vehicle.style, desired_speed_factor=0.85, flow_share=1.0, flow_speed_factor=1.1)
+    assert vehicle.wished_speed_mps == pytest.approx(0.85 * LIMIT)
+    drive(on, 20)
+    around = np.mean([other.speed for other in on.vehicles if other is not vehicle])
+    assert vehicle.wished_speed_mps == pytest.approx(min(1.1 * around, 1.25 * 0.85 * LIMIT), rel=0.03)
+    assert all(other.flow_ratio == 1.0 for other in on.vehicles if other is not vehicle)
