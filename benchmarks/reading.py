@@ -47,6 +47,15 @@ AV2 = """
         found += sum(len(track.object_states) for track in scenario.tracks)
         lanes = ArgoverseStaticMap.from_json(next(file.parent.glob("log_map_archive_*.json")))
 """
+COMMONROAD = """
+    import logging, warnings
+    logging.disable(logging.CRITICAL)
+    warnings.simplefilter("ignore")
+    from commonroad.common.file_reader import CommonRoadFileReader
+    for file in sorted(root.glob("*.xml")):
+        scenario, _ = CommonRoadFileReader(str(file)).open()
+        found += sum(1 + len(o.prediction.trajectory.state_list) for o in scenario.dynamic_obstacles)
+"""
 READ = """
 import resource, sys
 from stylesim.datasets.reading import read
@@ -72,6 +81,12 @@ CASES: tuple[Case, ...] = (
     Case("scenarionet", "scenarionet"),
     Case("nuplan", "nuplan"),
     Case("lyft", "lyft"),
+    Case("commonroad", "commonroad", COMMONROAD),
+    Case("interaction", "interaction"),
+    Case("taf_bw", "taf_bw"),
+    Case("ngsim", "ngsim"),
+    Case("dlr_ht", "dlr_ht"),
+    Case("smarts", "smarts_i80"),
 )
 
 

@@ -24,15 +24,28 @@ def parse(path: Path, *, root: str | None = None) -> ElementTree.Element:
     InputError where the file is missing, too large, damaged, of another root, or declares a document type: with
     it come entities, which can grow without bound or name other files.
     """
+    return tree(checked_bytes(path), path, root=root)
+
+
+def checked_bytes(path: Path) -> bytes:
+    """The content of a well-formed XML file without a document type; InputError as for `parse`."""
     raw = _bounded(path)
     try:
         _refuse_document_type(raw, path)
-        tree = ElementTree.fromstring(raw)  # the prologue was judged above; what follows it cannot declare entities
-    except (expat.ExpatError, ElementTree.ParseError, ValueError, LookupError) as error:
+    except (expat.ExpatError, ValueError, LookupError) as error:
         raise InputError(f"{path} is damaged or no XML ({error}); get it again") from error
-    if root is not None and tree.tag != root:
-        raise InputError(f"{path} is another kind of XML: its root is <{tree.tag[:80]}>, expected <{root}>")
-    return tree
+    return raw
+
+
+def tree(raw: bytes, path: Path, *, root: str | None = None) -> ElementTree.Element:
+    """The root element of what `checked_bytes` gave; InputError where it is another one, or something is damaged."""
+    try:
+        found = ElementTree.fromstring(raw)  # judged before: no document type, hence no entities
+    except (ElementTree.ParseError, ValueError, LookupError) as error:
+        raise InputError(f"{path} is damaged or no XML ({error}); get it again") from error
+    if root is not None and found.tag != root:
+        raise InputError(f"{path} is another kind of XML: its root is <{found.tag[:80]}>, expected <{root}>")
+    return found
 
 
 def root_name(path: Path) -> str:
@@ -77,13 +90,6 @@ def _refuse_document_type(raw: bytes, path: Path) -> None:
     def refuse(*_: object) -> None:
         raise InputError(f"{path} declares a document type (<!DOCTYPE …>); such files are not read: remove it")
 
-    def reached(*_: object) -> None:
-        raise _RootReachedError
-
     parser = expat.ParserCreate()
     parser.StartDoctypeDeclHandler = refuse
-    parser.StartElementHandler = reached
-    try:
-        parser.Parse(raw, True)
-    except _RootReachedError:
-        return
+    parser.Parse(raw, True)

@@ -18,10 +18,10 @@ import numpy as np
 import polars as pl
 
 from stylesim.datasets.commonroad_map import points, read_road
+from stylesim.datasets.commonroad_states import State, without_trajectories
 from stylesim.datasets.cutting import cut
 from stylesim.datasets.guarding import reading
 from stylesim.datasets.maps.site_map import SiteMap
-from stylesim.datasets.maps.xml import parse, root_name
 from stylesim.datasets.recording import SignalLog
 from stylesim.datasets.resampling import on_clock
 from stylesim.datasets.sniffing import matching
@@ -30,6 +30,7 @@ from stylesim.errors import InputError
 from stylesim.scene import Scene
 from stylesim.signals import SignalState
 from stylesim.tracks import AgentKind
+from stylesim.xmlfiles import checked_bytes, root_name, tree
 
 SOURCE = "commonroad"
 VERSIONS = ("2018b", "2020a")
@@ -86,7 +87,10 @@ def sniff(path: Path) -> bool:
 
 
 def _scenes(file: Path) -> Iterator[Scene]:
-    root = parse(file, root="commonRoad")
+    raw = checked_bytes(file)
+    with reading(file, "scenario of CommonRoad"):
+        raw, trajectories = without_trajectories(raw)
+    root = tree(raw, file, root="commonRoad")
     version = root.get("commonRoadVersion", "")
     if version not in VERSIONS:
         raise InputError(f"{file} is of version {version!r:.40}; read are {' and '.join(VERSIONS)}")
@@ -95,7 +99,7 @@ def _scenes(file: Path) -> Iterator[Scene]:
         if not 0.005 <= dt_s <= 2.0:
             raise InputError(f"{file}: timeStepSize is {root.get('timeStepSize')!r}; expected seconds, 0.005 to 2")
         name = (root.get("benchmarkID") or file.stem)[:200]
-        table, dropped = _table(root, file)
+        table, dropped = _table(root, file, trajectories)
         recording, origin = recording_of(table, Source(file, f"{SOURCE}_{name}", dt_s, dropped))
         site = read_road(root, origin)
         log = _lights(root, site, int(recording.frame.max(initial=0)) + 1, dt_s)
@@ -113,7 +117,7 @@ def _scenes(file: Path) -> Iterator[Scene]:
     )
 
 
-def _table(root: Element, file: Path) -> tuple[pl.DataFrame, dict[str, int]]:
+def _table(root: Element, file: Path, trajectories: list[list[State]]) -> tuple[pl.DataFrame, dict[str, int]]:
     """One row per state of an obstacle; a static obstacle's one state holds in every frame."""
     rows: list[tuple[str, int, float, float, float, float, float, float, int]] = []
     still: list[tuple[str, float, float, float, float, float, int]] = []
@@ -123,10 +127,9 @@ def _table(root: Element, file: Path) -> tuple[pl.DataFrame, dict[str, int]]:
             agent = obstacle.get("id", "")
             kind = int(KINDS.get(obstacle.findtext("type", ""), AgentKind.OTHER))
             length, width, dx, dy, turn = _shape(obstacle.find("shape"))
-            states = [*obstacle.findall("initialState"), *obstacle.findall("trajectory/state")]
             fixed = tag == "staticObstacle" or obstacle.findtext("role", "dynamic") == "static"
-            for state in states[:1] if fixed else states:
-                read = _state(state)
+            states = _states(obstacle, trajectories)
+            for read in states[:1] if fixed else states:
                 if read is None:
                     uncertain += 1  # an area or an interval where a place is needed
                     continue
@@ -173,7 +176,16 @@ def _shape(shape: Element | None) -> tuple[float, float, float, float, float]:
     return float(high[0] - low[0]), float(high[1] - low[1]), *((low + high) / 2).tolist(), 0.0
 
 
-def _state(state: Element) -> tuple[int, float, float, float, float] | None:
+def _states(obstacle: Element, trajectories: list[list[State]]) -> list[State | None]:
+    """All states of an obstacle in the order of the file; None for one that is not exact."""
+    found = [_state(state) for state in obstacle.findall("initialState")]
+    for trajectory in obstacle.findall("trajectory"):
+        number = trajectory.get("states")
+        found += [_state(s) for s in trajectory.findall("state")] if number is None else trajectories[int(number)]
+    return found
+
+
+def _state(state: Element) -> State | None:
     """Step, place, orientation and speed; None where one of the first three is not exact."""
     time, heading = state.findtext("time/exact"), state.findtext("orientation/exact")
     x, y = state.findtext("position/point/x"), state.findtext("position/point/y")

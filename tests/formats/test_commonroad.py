@@ -87,3 +87,60 @@ def test_real_scenarios(shared_data):
     assert all(new.signals.lane_id)
     assert new.road.lane("3419").speed_limit_mps == pytest.approx(13.4112)
     assert sum(lane.stop_line_m is not None for lane in new.road.lanes) > 10
+
+
+@pytest.mark.parametrize(
+    "change",
+    [
+        lambda text: text.replace("</commonRoad>", "<!-- read as a tree --></commonRoad>"),
+        lambda text: text.replace("<trajectory>", "<trajectory >"),
+        lambda text: text.replace("<velocity><exact>", "<odd/><velocity><exact>"),
+        lambda text: text.replace("<state>", "<state>\n  "),
+        lambda text: text.replace("<exact>5</exact>", "<exact>5.0</exact>"),
+    ],
+    ids=["comment", "space", "unknown field", "indented", "a step that is no whole number in the text"],
+)
+def test_both_ways_of_reading_states_give_the_same(tmp_path, change):
+    (one,) = scenes(commonroad.write(tmp_path))
+    path = commonroad.write(tmp_path)
+    text = path.read_text()
+    assert change(text) != text
+    path.write_text(change(text))
+    (other,) = scenes(path)
+    for name in ("position_m", "velocity_mps", "heading_rad", "valid"):
+        np.testing.assert_array_equal(getattr(one.tracks, name), getattr(other.tracks, name))
+    assert one.tracks.agent_id == other.tracks.agent_id
+    assert dict(one.counts) == dict(other.counts)
+
+
+def test_states_that_are_commented_out_are_not_read(tmp_path):
+    path = commonroad.write(tmp_path)
+    text = path.read_text()
+    start = text.index("<state>")
+    end = text.index("</state>") + len("</state>")
+    path.write_text(text[:start] + "<!--" + text[start:end] + "-->" + text[end:])
+    (scene,) = scenes(path)
+    assert scene.tracks.valid[0].sum() == 59
+
+
+def test_what_commonroad_io_reads(shared_data):
+    """commonroad-io 2026.1 on USA_Lanker-1_10_T-1: a state, a centre line, and lights at chosen steps."""
+    file = shared_data / "commonroad" / "USA_Lanker-1_10_T-1.xml"
+    if not file.is_file():
+        pytest.skip(f"no scenario at {file}")
+    (scene,) = scenes(file)
+    lane = scene.road.lane("3419")
+    np.testing.assert_allclose(
+        lane.centre_line_m[:3] + scene.tracks.origin_m,
+        [[29.302717, 54.391478], [24.8959, 45.41495], [21.46495, 38.426]],
+        atol=1e-4,
+    )
+    agent = scene.tracks.agent_id.index("1881")
+    np.testing.assert_allclose(
+        scene.tracks.position_m[agent, 6] + scene.tracks.origin_m, [-28.1178, -53.8022], atol=1e-4
+    )
+    assert scene.tracks.heading_rad[agent, 6] == pytest.approx(-2.0349, abs=1e-5)
+    assert scene.tracks.speed_mps[agent, 6] == pytest.approx(13.6246, abs=1e-5)
+    shown = {i: SignalState(k).name for i, k in zip(scene.signals.signal_id, scene.signals.state[:, 5], strict=True)}
+    expected = dict.fromkeys(("3772", "3773", "3775", "3778"), "RED") | dict.fromkeys(("3776", "3777", "3779"), "GREEN")
+    assert shown == expected | {"3774": "DARK"}
