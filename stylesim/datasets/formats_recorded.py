@@ -13,7 +13,7 @@ FORMATS = (
         has_signals=True,
         licence="CC BY 4.0",
         where="https://doi.org/10.5281/zenodo.15754836",
-        options=("scene_s", "road"),
+        options=("scene_s", "road", "links"),
         numbers=("scene_s",),
     ),
     DatasetFormat(

@@ -39,6 +39,26 @@ class Link:
     crossings: int
 
 
+def with_stop_lines(road: Road) -> Road:
+    """The road with a stop line at the end of each lane that leads into a junction and has none."""
+    inside = {lane.lane_id for lane in road.lanes if lane.in_junction}
+    lanes = tuple(
+        replace(lane, stop_line_m=_end_line(lane))
+        if lane.stop_line_m is None and not lane.in_junction and inside & set(lane.successors)
+        else lane
+        for lane in road.lanes
+    )
+    return replace(road, lanes=lanes)
+
+
+def _end_line(lane: Lane) -> Float64[np.ndarray, "2 2"]:
+    end = lane.centre_line_m[-1].astype(np.float64)
+    ahead = end - lane.centre_line_m[-2].astype(np.float64)
+    half = (lane.width_m if np.isfinite(lane.width_m) else DEFAULT_WIDTH_M) / 2
+    across = half * np.array([-ahead[1], ahead[0]]) / max(float(np.hypot(*ahead)), 1e-9)
+    return np.stack([end + across, end - across])
+
+
 def linked(recording: Recording, road: Road | None, origin_m: Float64[np.ndarray, " 2"]) -> Recording:
     """The recording with inferred links for the lanes that no light controls yet; counted in its notes.
 
@@ -70,6 +90,9 @@ def infer_links(
     end = float(recording.frame.max(initial=0)) * recording.dt_s
     share = _share(go, log.time_s, end)
     candidate = (share > 0.02) & (share < 0.98)  # chosen: a light that hardly changes says nothing about a lane
+    yellow = (log.state == SignalState.YELLOW).any(axis=1)
+    if yellow.any():  # lights without yellow are then those of people
+        candidate &= yellow
     found = []
     for lane in lanes:
         times = crossing_times(recording, lane, origin_m)

@@ -238,3 +238,16 @@ def test_truncating_the_source_at_t0_changes_no_history(tmp_path):
     np.testing.assert_array_equal(whole.signals.state, cut.signals.state)
     for one, other in zip(whole.road.lanes, cut.road.lanes, strict=True):
         np.testing.assert_array_equal(one.centre_line_m, other.centre_line_m)
+
+
+def test_links_of_lights_are_inferred_where_they_are_sure():
+    scene = next(iter(scenes(SHIPPED, links="infer")))
+    assert scene.signals is not None
+    assert scene.road is not None
+    linked = {i: lanes for i, lanes in zip(scene.signals.signal_id, scene.signals.lane_id, strict=True) if lanes}
+    assert scene.counts["light_links_inferred"] == sum(map(len, linked.values())) >= 2
+    assert scene.counts["light_links_inferred"] + scene.counts["light_links_unknown"] == 9
+    assert all(int(i) <= 13 for i in linked), "lights 14 to 29 have no yellow: they are not for vehicles"
+    assert {lane for lanes in linked.values() for lane in lanes} <= {lane.lane_id for lane in scene.road.lanes}
+    without = next(iter(scenes(SHIPPED)))
+    assert not any(without.signals.lane_id)
