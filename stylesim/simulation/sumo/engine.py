@@ -34,6 +34,7 @@ class VehicleApi(Protocol):
     def getNextTLS(self, vehID: str) -> Sequence[tuple[str, int, float, str]]: ...  # noqa: D102, N802
     def getSpeed(self, vehID: str) -> float: ...  # noqa: D102, N802
     def setSpeed(self, vehID: str, speed: float) -> None: ...  # noqa: D102, N802
+    def getRoadID(self, vehID: str) -> str: ...  # noqa: D102, N802
     def getSpeedMode(self, vehID: str) -> int: ...  # noqa: D102, N802
     def setSpeedMode(self, vehID: str, sm: int) -> None: ...  # noqa: D102, N802
     def getLaneID(self, vehID: str) -> str: ...  # noqa: D102, N802

@@ -20,6 +20,7 @@ from dataclasses import dataclass, replace
 
 from stylesim.simulation.driving import YellowDecision, decide_at_yellow, wished_deceleration
 from stylesim.simulation.stopping import EMERGENCY_MPS2, HARD_MPS2, STANDING_MPS, StopPlan, latest_response_s
+from stylesim.simulation.sumo.clearing import JunctionClearing
 from stylesim.simulation.sumo.engine import SumoApi
 from stylesim.simulation.sumo.episode import DT_S, Episode
 from stylesim.simulation.sumo.signals import ONSET_S
@@ -70,6 +71,7 @@ class YellowController:
         self._sumo, self._files = sumo, files
         self._shown = dict.fromkeys(files.signals, "")
         self._wet = bool(files.parameters.get("wet_road", 0.0))
+        self._clearing = JunctionClearing(sumo, files)
         self._under_way: dict[str, _Approach] = {}
         self._times_decided: dict[str, int] = {}
         self.events: list[DecisionEvent] = []
@@ -77,6 +79,7 @@ class YellowController:
     def before_step(self, step: int) -> None:
         """Looks which lights the step before has changed; who is near a new yellow decides, who decided drives on."""
         self._drive()
+        self._clearing.before_step()
         onsets: set[tuple[str, int]] = set()
         for signal, before in self._shown.items():
             now = self._sumo.trafficlight.getRedYellowGreenState(signal)
@@ -86,7 +89,9 @@ class YellowController:
             changes = list(enumerate(zip(before, now, strict=False)))
             onsets |= {(signal, link) for link, (old, new) in changes if old in "Gg" and new in "yY"}
             self._turned_green(signal, now)
-            self._turned_red(signal, {link for link, (old, new) in changes if old in "yY" and new == "r"}, step)
+            if red := {link for link, (old, new) in changes if old in "yY" and new == "r"}:
+                self._turned_red(signal, red, step)
+                self._clearing.turned_red(signal)
         if onsets:
             self._ask(onsets, step - 1)
 
