@@ -6,7 +6,7 @@ import subprocess
 import sys
 import time
 
-NAMES = ("generation", "labelling", "memory", "environment_speed", "training")
+NAMES = ("generation", "labelling", "memory", "environment_speed", "training", "reading")
 
 
 def main() -> None:

@@ -113,6 +113,9 @@ def _boundary(
         places = centre_m[max(start, 0) : end + 1]
         if line is None or len(line) < 2 or not len(places):
             continue
+        line = _stretch_near(places, line)
+        if len(line) < 2:
+            continue
         feet = nearest_points(places, line)
         apart = np.hypot(*(feet - places).T)
         near = apart <= MAX_HALF_WIDTH_M
@@ -121,6 +124,16 @@ def _boundary(
     if not found or sum(map(len, found)) < 2:
         return None, float("nan")
     return map_line(np.concatenate(found), np.zeros(2)), float(np.median(np.concatenate(distances)))
+
+
+def _stretch_near(
+    places_m: Float64[np.ndarray, "place 2"], line_m: Float32[np.ndarray, "point 2"]
+) -> Float32[np.ndarray, "near 2"]:
+    """The stretch of a line outside of which no point is within MAX_HALF_WIDTH_M of any place: boundaries are long."""
+    reach = MAX_HALF_WIDTH_M + float(np.hypot(*np.diff(line_m, axis=0).T).max())
+    low, high = places_m.min(axis=0) - reach, places_m.max(axis=0) + reach
+    inside = np.flatnonzero(((line_m >= low) & (line_m <= high)).all(axis=1))
+    return line_m[max(inside[0] - 1, 0) : inside[-1] + 2] if len(inside) else line_m[:0]
 
 
 def _longest(stretches: Sequence[Stretch], centres: Mapping[str, Any]) -> str:

@@ -111,10 +111,12 @@ def _states(data: bytes, where: list[wire.Span]) -> dict[str, np.ndarray]:
         values[name][same] = rows[name][regular]
     for i in np.flatnonzero(~same).tolist():
         state = wire.fields(data, where[i])
+        values["valid"][i] = wire.integer(state, 11)
+        if not values["valid"][i]:
+            continue  # nothing is read from what is not valid
         for number, name in enumerate(_VALUES, start=2):
             if name != "valid":
                 values[name][i] = wire.real(data, state, number)
-        values["valid"][i] = wire.integer(state, 11)
     return values
 
 
