@@ -17,7 +17,7 @@ from stylesim.simulation.plan import EpisodePlan, stressors_of
 from stylesim.tracks import AgentKind, TrackFlag
 
 CROWD = Population.load("tdbm_spectrum")
-SITES = {"sumo": ("ramp_merge", 40.0, 30.0)}
+SITES = {"highway": ("highway", 3.0, 20.0), "sumo": ("ramp_merge", 40.0, 30.0)}
 HAPPEN = ("hard_brake", "cut_in", "jaywalker", "deer", "stalled")
 
 
@@ -28,6 +28,15 @@ class Site:
         name, warm_up_s, duration_s = SITES[backend]
         self.scenario = load_scenario(name).model_copy(update={"warm_up_s": warm_up_s, "duration_s": duration_s})
         self.backend: Backend = open_backend(backend)
+
+    def happened(self, kind: str) -> tuple[Scene, int]:
+        """The first of six episodes in which somebody fitted, and its number."""
+        for episode in range(6):
+            scene = self.run(kind, episode)
+            assert scene.counts[f"stressor.{kind}"] + scene.counts[f"stressor.{kind}.nobody_fitted"] == 1
+            if scene.metadata["events"]:
+                return scene, episode
+        raise AssertionError(f"{kind} finds nobody in six episodes")
 
     @cache  # noqa: B019 - lives as long as the module's tests
     def run(self, stressors: str, episode: int = 0) -> Scene:
@@ -47,7 +56,7 @@ def site(request: pytest.FixtureRequest) -> Iterator[Site]:
 
 @pytest.mark.parametrize("kind", HAPPEN)
 def test_it_happens_and_is_said(site: Site, kind: str) -> None:
-    scene = site.run(kind)
+    scene, _ = site.happened(kind)
     (event,) = scene.metadata["events"]
     assert (event["kind"], scene.counts[f"stressor.{kind}"]) == (kind, 1)
     tracks = scene.tracks
@@ -72,7 +81,8 @@ def test_it_happens_and_is_said(site: Site, kind: str) -> None:
 
 @pytest.mark.parametrize("kind", HAPPEN)
 def test_nothing_before_it_is_touched(site: Site, kind: str) -> None:
-    plain, scene = site.run(""), site.run(kind)
+    scene, episode = site.happened(kind)
+    plain = site.run("", episode)
     frame = round(scene.metadata["events"][0]["time_s"] / scene.tracks.dt_s)
     one, other = (s.tracks.frames(0, frame) for s in (plain, scene))
     one, other = (tracks.select(tracks.valid.any(axis=1)) for tracks in (one, other))
@@ -89,7 +99,7 @@ def test_all_at_once_and_again_the_same(site: Site) -> None:
     assert dict(one.counts) == dict(two.counts)
     np.testing.assert_array_equal(one.tracks.position_m, two.tracks.position_m)
     actors = [event["actor"] for event in one.metadata["events"]]
-    assert len(set(actors)) == len(actors) >= 3
+    assert len(set(actors)) == len(actors) >= 2
 
 
 def test_a_red_runner_needs_a_crossing(site: Site) -> None:
@@ -102,7 +112,7 @@ def test_a_red_runner_runs_red(site: Site) -> None:
         pytest.skip("no scenario with a signal")
     scenario = load_scenario("yellow_light").model_copy(update={"duration_s": 60.0})
     plan = EpisodePlan(stressors=stressors_of("red_runner"))
-    scenes = [site.backend.run_episode(scenario, CROWD, seed=3, episode=episode, plan=plan) for episode in (0, 1)]
+    scenes = [site.backend.run_episode(scenario, CROWD, seed=3, episode=episode, plan=plan) for episode in range(4)]
     happened = [(scene, event) for scene in scenes for event in scene.metadata["events"]]
     assert happened
     for scene, event in happened:

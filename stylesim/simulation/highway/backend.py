@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import numpy as np
 
-from stylesim.errors import InputError
 from stylesim.population import Population
 from stylesim.randomness import stream
 from stylesim.scenario import Scenario
@@ -14,8 +13,10 @@ from stylesim.simulation.highway.layouts import traffic_of
 from stylesim.simulation.highway.log import TrackLog
 from stylesim.simulation.highway.planned import PlannedEgo
 from stylesim.simulation.highway.spec import LOG_HZ, options_of
+from stylesim.simulation.highway.stressing import Stressing
 from stylesim.simulation.highway.traffic import Crew, Traffic
 from stylesim.simulation.plan import PLAIN, EpisodePlan
+from stylesim.simulation.stressors import attempts, check_possible, with_events
 from stylesim.tracks import TrackFlag, Tracks
 
 SOURCE = "highway_env"
@@ -41,12 +42,14 @@ class HighwayBackend:
         self, scenario: Scenario, population: Population, *, seed: int, episode: int, plan: EpisodePlan = PLAIN
     ) -> Scene:
         """One episode at 10 Hz; the same arguments give the same scene. InputError for options that do not fit."""
-        if plan.stressors:
-            raise InputError(f"scenario {scenario.name!r}: the backend 'highway' has no stressors yet; SUMO has")
         options = options_of(scenario)
         drawn = scenario.draw(stream(seed, episode, "", "parameters"))
         crew = Crew(population, seed=seed, episode=episode, twin=plan.twin)
         traffic = traffic_of(options, drawn, crew, time_s=scenario.warm_up_s + scenario.duration_s)
+        road = road_of(traffic.road.network, junction_nodes=traffic.junction_nodes)
+        check_possible(plan, road, scenario.name)
+        tries = attempts(plan, seed=seed, episode=episode, duration_s=scenario.duration_s)
+        stressing = Stressing(traffic, crew, road, list(tries))
         n_frames = round(scenario.duration_s * LOG_HZ)
         log = TrackLog(n_frames, 1.0 / LOG_HZ)
         for _ in range(round(scenario.warm_up_s * options.simulation_hz)):
@@ -61,6 +64,7 @@ class HighwayBackend:
             if ego is not None:
                 ego.after_frame()
             crew.after_frame(frame / LOG_HZ, traffic.road.vehicles)
+            stressing.after_frame(frame / LOG_HZ)
             for _ in range(options.simulation_hz // LOG_HZ):
                 traffic.advance()
         tracks = log.tracks(set(traffic.removed), traffic.flags())
@@ -71,12 +75,13 @@ class HighwayBackend:
             source=SOURCE,
             scenario=scenario.name,
             tracks=tracks,
-            road=road_of(traffic.road.network, junction_nodes=traffic.junction_nodes),
+            road=road,
             signals=traffic.signals(),
             counts=_counts(tracks, traffic, log, removed_before_log=early),
             parameters=drawn,
         )
-        return plan.applied_to(scene if ego is None else ego.in_scene(scene))
+        scene = scene if ego is None else ego.in_scene(scene)
+        return plan.applied_to(with_events(scene, stressing.outcome(), plan))
 
     def close(self) -> None:
         """Nothing is held."""

@@ -66,12 +66,18 @@ class LaneKeeping:
     def __init__(self, wander: Any, change_s: float) -> None:
         self._wander, self._change_s = wander, change_s
         self._next_change_s = change_s
+        self._hurried_s = math.inf
         self._from_m, self._since_s = 0.0, math.inf
+
+    def hurry(self, change_s: float) -> None:
+        """The next change takes that long, whatever the style's."""
+        self._hurried_s = change_s
 
     def begin_change(self, from_m: float) -> None:
         """A change begins at that place of the new lane (m, right of its centre)."""
         self._from_m, self._since_s = from_m, 0.0
-        self._change_s = self._next_change_s
+        self._change_s = min(self._next_change_s, self._hurried_s)
+        self._hurried_s = math.inf
 
     def retune(self, style: DriverStyle, rng: np.random.Generator | None = None) -> None:
         """Another person from here on; a lane change under way is finished as it was begun."""

@@ -54,6 +54,8 @@ class StyledVehicle(IDMVehicle):  # type: ignore[misc]
         self.stop_ahead_m = math.inf  # to where it has decided to stop, from its front bumper; set by the lights
         self.emergency_braked = False
         self.lateral_mps2 = LATERAL_MPS2  # accepted now
+        self.event_mps2 = math.inf  # a stressor: it accelerates no more than that
+        self.runs = False  # a stressor: it drives on whatever light and right of way say
         self._wheel_rad = 0.0
         self._was_yielding = False
         self._hesitation_s = 0.0
@@ -86,7 +88,8 @@ class StyledVehicle(IDMVehicle):  # type: ignore[misc]
         """What the driver would drive on a free road here; 0 while it yields or hesitates after yielding."""
         if self.style is None:
             return float(min(max(self.target_speed, 0.0), self.lane.speed_limit))
-        if self.waits_for_gap or self._hesitation_s > 0 or getattr(self, "is_yielding", False):
+        yields = self.waits_for_gap or self._hesitation_s > 0 or getattr(self, "is_yielding", False)
+        if yields and not self.runs:
             return 0.0
         limit = self.free_wish_mps * self.flow_ratio
         if not self.road.graph.winds:
@@ -124,10 +127,17 @@ class StyledVehicle(IDMVehicle):  # type: ignore[misc]
         end = self._lane_end_m()
         if end < math.inf:
             acceleration = min(acceleration, self._before_standing(end))
-        if self.stop_ahead_m < math.inf:  # with what it takes, evenly
+        if self.stop_ahead_m < math.inf and not self.runs:  # with what it takes, evenly
             needed = self.speed**2 / (2.0 * max(self.stop_ahead_m, LEAST_GAP_M))
             acceleration = min(acceleration, -min(needed, TYRES_MPS2))
+        acceleration = min(acceleration, self.event_mps2)
         self.action = {"steering": self.steering_control(self.target_lane_index), "acceleration": acceleration}
+
+    def cut_in(self, index: tuple[str, str, int], duration_s: float) -> None:
+        """A stressor: change onto that lane in that time, whoever is there."""
+        self._keeping.hurry(duration_s)
+        self.enable_lane_change = False
+        self.target_lane_index = index
 
     def judged(self, car: Any, leader: Any, gap_m: float) -> float:
         """IDM acceleration of `car` behind `leader` as this driver would drive it, with its own patience, m/s2."""

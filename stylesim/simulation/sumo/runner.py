@@ -62,6 +62,8 @@ class SumoBackend:
         recorder = Recorder(engine.sumo, signals=files.signals, first_step=first)
         yellow, zone = YellowController(engine.sumo, files), StopZone(engine.sumo, files)
         switch, flow = StyleSwitch(engine.sumo, files, yellow), FlowSense(engine.sumo, files)
+        if stressing is not None:
+            stressing.let_go = yellow.let_go
         for step in range(round(files.end_s / DT_S)):
             switch.before_step(step)
             flow.before_step(step)

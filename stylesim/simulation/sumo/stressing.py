@@ -6,6 +6,7 @@ is behind follows that driver by its car-following model.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import replace
 from typing import Any, Protocol, runtime_checkable
 
@@ -40,11 +41,16 @@ class Act(Protocol):
         ...
 
 
+def _nothing(_: str) -> None:
+    """Nobody else commands it."""
+
+
 class Stressing:
     """The stressors of one episode; call `before_step` ahead of every simulation step."""
 
     def __init__(self, sumo: Any, files: EpisodeFiles) -> None:
         self._sumo, self._files = sumo, files
+        self.let_go: Callable[[str], None] = _nothing  # what else commands a driver stops doing so
         self._waiting = list(attempts(files.plan, seed=files.seed, episode=files.episode, duration_s=files.duration_s))
         self._acts: list[Act] = []
         self._busy: set[str] = set()
@@ -123,6 +129,7 @@ class Stressing:
         ):
             return None
         self._note(attempt, now_s, actor=here.driver, victim="")
+        self.let_go(here.driver)
         return RunningRed(self._sumo, here, now_s)
 
     def _jaywalker(self, attempt: Attempt, here: Here, now_s: float) -> Act | None:

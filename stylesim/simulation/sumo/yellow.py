@@ -171,6 +171,10 @@ class YellowController:
         types.setParameter(type_id, AFTER_YELLOW, ALWAYS if itself else AT_ONSET)
         types.setParameter(type_id, AFTER_RED, ALWAYS if itself else OFF)
 
+    def let_go(self, driver_id: str) -> None:
+        """The driver is under somebody else's command now: whatever it has decided does not hold any more."""
+        self._release(driver_id)
+
     def tell_again(self, driver_id: str) -> None:
         """What the driver has decided at a light that is still ahead holds for its new vehicle type, too."""
         self._tell(driver_id, self._under_way.get(driver_id))
