@@ -6,7 +6,7 @@ import subprocess
 import sys
 import time
 
-NAMES = ("generation", "labelling", "memory", "environment_speed", "training", "reading")
+NAMES = ("generation", "labelling", "memory", "environment_speed", "training", "yellow_light", "reading")
 
 
 def main() -> None:
