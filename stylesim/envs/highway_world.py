@@ -52,21 +52,19 @@ class HighwayWorld:
         self._lights = SeenLights(self._traffic.lights)
         self._dt_s = 1.0 / options.simulation_hz
         self._numbers: dict[str, int] = {name: number for number, name in enumerate(self._names)}
-        self._hand_over(stream(seed, 0, EGO_ID, "entry"))
         for _ in range(round(SETTLE_S * options.simulation_hz)):
             self._traffic.advance()
-            self._lights.after_step(self._egos)
-        for ego in self._egos:
-            if ego.crashed or ego not in self._traffic.road.vehicles:
-                raise SimulationError(f"the ego was hit while the crowd of scenario {scenario.name!r} settled")
-            ego.start_clock()
+            self._lights.after_step(())
+        self._hand_over(stream(seed, 0, EGO_ID, "entry"))
         return self._snapshots()
 
     def _hand_over(self, rng: np.random.Generator) -> None:
         """Cars of the half with most road ahead become the egos', so that most of the traffic lies about and ahead."""
         road, count = self._road(), len(self._names)
         self._wait_for_traffic(count)
-        farthest_first = sorted(road.vehicles, key=lambda car: (-ahead_m(car), car.driver_id))
+        farthest_first = sorted(
+            (car for car in road.vehicles if not car.crashed), key=lambda car: (-ahead_m(car), car.driver_id)
+        )
         half = max(count, len(farthest_first) // 2)
         chosen = rng.choice(half, size=count, replace=False) if count > 1 else [int(rng.integers(half))]
         for name, number in zip(self._names, chosen, strict=True):
@@ -82,7 +80,7 @@ class HighwayWorld:
         """Let the crowd come in until there are enough drivers to take over."""
         assert self._traffic is not None
         for _ in range(round(PATIENCE_S / self._dt_s)):
-            if len(self._traffic.road.vehicles) >= count:
+            if sum(not car.crashed for car in self._traffic.road.vehicles) >= count:
                 return
             self._traffic.advance()
         here = len(self._road().vehicles)

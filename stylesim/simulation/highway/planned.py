@@ -47,9 +47,10 @@ class PlannedEgo:
     def before_frame(self) -> None:
         """Take over one of the half of the cars that have most road ahead, as soon as there is a car."""
         road = self._traffic.road
-        if self._car is not None or not road.vehicles:
+        sound = [car for car in road.vehicles if not car.crashed]
+        if self._car is not None or not sound:
             return
-        cars = sorted(road.vehicles, key=lambda car: (-ahead_m(car), car.driver_id))
+        cars = sorted(sound, key=lambda car: (-ahead_m(car), car.driver_id))
         driver = cars[int(self._rng.integers(max(1, len(cars) // 2)))]
         car = PlannedVehicle(road, driver.position, driver.heading, driver.speed)
         car.target_lane_index, car.route, car.needs = driver.target_lane_index, driver.route, driver.needs
