@@ -17,8 +17,16 @@ from stylesim.tracks import TrackFlag
 from tests.contract.test_reader import sample
 from tests.formats.mutations import mutate_files
 
-QUICK, MANY = 12, 2000
+QUICK, MANY, REAL = 12, 2000, 100
+# Where recorded files of a format are, under the folder of shared data; the smallest are taken, to be quick.
+RECORDED = {
+    "av2": "av2", "womd": "womd/tfrecord", "gpudrive": "womd/json", "nuplan": "nuplan", "scenarionet": "scenarionet",
+    "lyft": "lyft", "dlr_ut": "dlr_ut",
+}  # fmt: skip
 PATIENCE_S = 30  # a sample takes well under a second: longer is a hang
+
+
+FARTHEST_M = 40_000.0  # MAX_DISTANCE_M from the middle of all, from which the origin may be as far
 
 
 class HungError(Exception):
@@ -61,9 +69,7 @@ def _sound(tracks):
         assert np.isfinite(values[there]).all()
     assert (tracks.size_m > 0).all()
     assert tracks.size_m.max(initial=0.0) <= 30.0
-    assert (
-        np.abs(tracks.position_m[there]).max(initial=0.0) <= 40_000.0
-    )  # MAX_DISTANCE_M from the middle of all, which the origin may be as far from
+    assert np.abs(tracks.position_m[there]).max(initial=0.0) <= FARTHEST_M
     flagged = tracks.flagged(TrackFlag.IMPLAUSIBLE)
     assert not (implausible(tracks).agents & ~flagged).any(), "implausible and not flagged"
     with np.errstate(invalid="ignore"):
@@ -74,6 +80,10 @@ def attack(name, tmp_path, n):
     clean = tmp_path / "clean"
     given = sample(name, clean)
     assert hold(name, given) == "read"
+    return damage(name, clean, given, tmp_path, n)
+
+
+def damage(name, clean, given, tmp_path, n, *, values=True):
     files = importlib.import_module(f"tests.formats.{name}_files")
     outcomes = Counter()
     for seed in range(n):
@@ -81,7 +91,7 @@ def attack(name, tmp_path, n):
         folder = tmp_path / "damaged"
         shutil.copytree(clean, folder, symlinks=True)
         path = folder / given.relative_to(clean)
-        if hasattr(files, "mutate") and rng.random() < 0.5:
+        if values and hasattr(files, "mutate") and rng.random() < 0.5:
             what = "values"
             files.mutate(folder, rng)
         else:
@@ -107,3 +117,17 @@ def test_many_mutations(name, tmp_path):
     outcomes = attack(name, tmp_path, MANY)
     assert outcomes["refused"] > 0, "nothing was ever refused: the mutations do not bite"
     assert outcomes["read"] > 0
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", sorted(RECORDED))
+def test_mutations_of_recorded_files(name, tmp_path, shared_data):
+    source = shared_data / RECORDED[name]
+    if not source.is_dir():
+        pytest.skip(f"no recorded files at {source}")
+    clean = tmp_path / "clean"
+    shutil.copytree(source, clean)
+    for path in (clean, *clean.rglob("*")):
+        path.chmod(0o755 if path.is_dir() else 0o644)
+    outcomes = damage(name, clean, clean, tmp_path, REAL, values=False)
+    assert sum(outcomes.values()) == REAL
