@@ -20,7 +20,7 @@ _FIELDS = (
     rb"</(?:acceleration|velocityY|accelerationY|yawRate|slipAngle|steeringAngle|jerk)>",
 )
 _STATE = re.compile(rb"<state>\s*(?:(?:" + rb"|".join(_FIELDS) + rb")\s*)+</state>")
-_TRAJECTORY = re.compile(rb"<trajectory>(.*?)</trajectory>", re.DOTALL)
+_BEGIN, _END = b"<trajectory>", b"</trajectory>"
 
 State = tuple[int, float, float, float, float]  # step, x, y, orientation, speed
 
@@ -33,15 +33,17 @@ def without_trajectories(raw: bytes) -> tuple[bytes, list[list[State]]]:
     if b"<!--" in raw or b"<![CDATA[" in raw or b"<trajectory " in raw:
         return raw, []
     found: list[list[State]] = []
-
-    def replaced(match: re.Match[bytes]) -> bytes:
-        states = _states(match[1])
+    kept, done = [], 0
+    while (start := raw.find(_BEGIN, done)) >= 0 and (end := raw.find(_END, start)) >= 0:
+        states = _states(raw[start + len(_BEGIN) : end])
+        kept.append(raw[done:start])
         if states is None:
-            return match[0]
-        found.append(states)
-        return b'<trajectory states="%d"/>' % (len(found) - 1)
-
-    return _TRAJECTORY.sub(replaced, raw), found
+            kept.append(raw[start : end + len(_END)])
+        else:
+            kept.append(b'<trajectory states="%d"/>' % len(found))
+            found.append(states)
+        done = end + len(_END)
+    return b"".join([*kept, raw[done:]]), found
 
 
 def _states(text: bytes) -> list[State] | None:
