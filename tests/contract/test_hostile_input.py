@@ -21,7 +21,8 @@ QUICK, MANY, REAL = 12, 2000, 100
 # Where recorded files of a format are, under the folder of shared data; the smallest are taken, to be quick.
 RECORDED = {
     "av2": "av2", "womd": "womd/tfrecord", "gpudrive": "womd/json", "nuplan": "nuplan", "scenarionet": "scenarionet",
-    "lyft": "lyft", "dlr_ut": "dlr_ut",
+    "lyft": "lyft", "dlr_ut": "dlr_ut", "interaction": "interaction", "taf_bw": "taf_bw", "ngsim": "ngsim",
+    "smarts": "smarts_i80",
 }  # fmt: skip
 PATIENCE_S = 30  # a sample takes well under a second: longer is a hang
 
