@@ -63,7 +63,8 @@ def test_reweighting_sets_one_and_scales_the_rest():
     heavy = base.reweighted(aggressive=0.3)
     assert heavy.by_class["aggressive"] == pytest.approx(0.3)
     assert sum(heavy.shares) == pytest.approx(1)
-    assert heavy.by_class["careful"] / heavy.by_class["timid"] == pytest.approx(2.0)
+    was = base.by_class["careful"] / base.by_class["timid"]
+    assert heavy.by_class["careful"] / heavy.by_class["timid"] == pytest.approx(was)
 
 
 @pytest.mark.parametrize(
