@@ -48,7 +48,7 @@ class DriverStyle:
     yellow_slope_per_s: float  # slope of the logistic there
     red_running_s: float  # how long after the onset of red a driver who decided to go still goes
     flow_share: float = 0.0  # how much of the wished speed comes from the traffic around, 0 to 1
-    flow_speed_factor: float = 1.0  # that part: wished speed / mean speed of the traffic around
+    flow_speed_factor: float = 1.0  # that part: wished speed / speed of the slower half of the traffic around
 
     def __post_init__(self) -> None:
         """Refuse a driver that no simulator could drive."""

@@ -45,24 +45,24 @@ WIDTH = np.array([b.width for b in BEHAVIOURS])
 # some wander, cautious ones slow and very smooth with a far gap, timid ones a little faster with the farthest gap.
 _START = {
     MOTORWAY: {
-        COMFORT: (38.0, 44.0, 38.0, 30.5, 31.0, 34.5),
+        COMFORT: (37.5, 44.5, 37.0, 31.0, 31.0, 35.0),
         "time_headway_s": (0.9, 1.6, 0.9, 1.9, 2.6, 3.0),
         "max_acceleration_mps2": (3.2, 2.2, 2.4, 1.6, 1.3, 1.8),
-        "pedal_noise_mps2": (1.2, 0.45, 0.1, 0.3, 0.03, 0.62),
-        "lane_wander_m": (0.48, 0.62, 0.2, 0.24, 0.1, 0.04),
-        "lane_change_eagerness": (5.0, 5.0, 5.0, 0.1, 0.1, 0.2),
-        "flow_share": (0.02, 0.02, 0.4, 0.7, 0.6, 0.7),
-        "flow_speed_factor": (1.12, 1.15, 1.15, 0.92, 0.94, 0.98),
+        "pedal_noise_mps2": (1.2, 0.45, 0.1, 0.3, 0.03, 0.6),
+        "lane_wander_m": (0.48, 0.62, 0.22, 0.25, 0.1, 0.04),
+        "lane_change_eagerness": (5.0, 5.0, 5.0, 0.1, 0.1, 0.15),
+        "flow_share": (0.02, 0.02, 0.4, 0.7, 0.7, 0.3),
+        "flow_speed_factor": (1.15, 1.2, 1.22, 0.96, 0.97, 1.06),
     },
     OTHER: {
-        COMFORT: (17.5, 19.0, 18.0, 13.0, 12.5, 15.0),
-        "time_headway_s": (0.9, 1.2, 0.9, 1.6, 2.2, 3.0),
+        COMFORT: (18.5, 21.0, 18.5, 13.0, 12.5, 16.0),
+        "time_headway_s": (0.9, 1.3, 0.9, 1.6, 2.2, 3.0),
         "max_acceleration_mps2": (3.2, 2.4, 2.4, 1.6, 1.3, 1.6),
-        "pedal_noise_mps2": (1.2, 0.2, 0.1, 0.4, 0.03, 0.75),
-        "lane_wander_m": (0.5, 0.62, 0.2, 0.3, 0.14, 0.05),
-        "lane_change_eagerness": (5.0, 4.0, 5.0, 0.3, 0.1, 0.2),
-        "flow_share": (0.1, 0.1, 0.2, 0.4, 0.4, 0.4),
-        "flow_speed_factor": (1.15, 1.15, 1.15, 0.95, 0.95, 1.0),
+        "pedal_noise_mps2": (1.2, 0.25, 0.1, 0.25, 0.03, 0.55),
+        "lane_wander_m": (0.5, 0.65, 0.24, 0.26, 0.1, 0.04),
+        "lane_change_eagerness": (5.0, 4.0, 5.0, 0.2, 0.1, 0.15),
+        "flow_share": (0.02, 0.02, 0.3, 0.4, 0.4, 0.1),
+        "flow_speed_factor": (1.15, 1.2, 1.22, 0.96, 0.97, 1.06),
     },
 }
 

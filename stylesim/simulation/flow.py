@@ -1,7 +1,7 @@
 """The wish for speed relative to the traffic around, whatever the simulator.
 
 People choose their speed by the limit and by what others do. Here the wished speed is a mixture: `flow_share` of it is
-`flow_speed_factor` times the mean speed of the traffic within sight, the rest is the driver's own wish. A bold driver
+`flow_speed_factor` times the speed of the slower half of the traffic in sight, the rest is the driver's own wish. A bold driver
 is thereby faster than those around, whoever they are, and a calm one slower; bounds keep both near what the driver
 would do on a free road [ours].
 """
@@ -24,12 +24,19 @@ def flow_speed(
     speed_mps: Float64[np.ndarray, " vehicle"],
     own_wish_mps: Float64[np.ndarray, " vehicle"],
 ) -> Float64[np.ndarray, " vehicle"]:
-    """Mean speed, m/s, of the others within sight that drive the same way and not in a queue; NaN without any."""
+    """Mean speed, m/s, of the slower half of those within sight that drive the same way, not in a queue; NaN without.
+
+    The slower half, because they are whom one meets: who wants to be faster passes them, who does not stays behind.
+    """
     apart = position_m[:, None] - position_m[None]
     near = (apart**2).sum(axis=2) <= SIGHT_M**2
     near &= direction @ direction.T >= SAME_WAY
     near &= speed_mps[None] >= QUEUE_SHARE * own_wish_mps[:, None]
     np.fill_diagonal(near, False)
+    seen = np.sort(np.where(near, speed_mps[None], np.inf), axis=1)
+    count = near.sum(axis=1)
+    middle = seen[np.arange(len(seen)), np.maximum(count - 1, 0) // 2]
+    near &= speed_mps[None] <= middle[:, None]
     count = near.sum(axis=1)
     return np.where(count > 0, (near @ speed_mps) / np.maximum(count, 1), np.nan)
 

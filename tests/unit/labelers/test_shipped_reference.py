@@ -6,6 +6,7 @@ import json
 
 import pytest
 
+from stylesim.evaluation.fidelity_targets import HELD_TO_TARGET
 from stylesim.labelers.reference import default_labeler, scalers_dir
 
 DEMO_SEED = 7  # tools/demo.py
@@ -17,4 +18,4 @@ def test_a_reference_ships_with_its_provenance(method):
     about = json.loads((scalers_dir() / f"sim-reference.{method}.json").read_text())["provenance"]
     assert about["corpus_seed"] not in (None, DEMO_SEED)
     assert len(about["corpus_fingerprint"]) == 64
-    assert set(about["scenarios"]) >= {"highway", "intersection", "ramp_merge", "yellow_light"}
+    assert set(about["scenarios"]) == set(HELD_TO_TARGET)
