@@ -107,9 +107,11 @@ def test_the_child_ends_with_its_killed_parent() -> None:
 
 def test_the_ego_can_stop_run_red_and_collide() -> None:
     outcomes = {"stopped": False, "red": False, "collided": False}
-    scenario = load_scenario("yellow_light").model_copy(update={"warm_up_s": 20.0})
+    shipped = load_scenario("yellow_light")
+    dense = shipped.parameters["demand_vph"].model_copy(update={"low": 2400.0, "high": 2800.0})  # somebody to hit
+    scenario = shipped.model_copy(update={"warm_up_s": 30.0, "parameters": shipped.parameters | {"demand_vph": dense}})
     world = SumoWorld(EnvConfig(entry="yellow", period_s=0.2, onset_tts_s=(4.5, 6.0)))
-    for seed in range(6):
+    for seed in range(12):
         world.reset(scenario=scenario, population=Population.load("naturalistic"), seed=seed)
         for _ in range(40):  # brakes at once
             (snapshot,) = world.step([EgoCommand(-4.0, float("nan"), 0)])
