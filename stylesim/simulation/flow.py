@@ -1,9 +1,9 @@
 """The wish for speed relative to the traffic around, whatever the simulator.
 
 People choose their speed by the limit and by what others do. Here the wished speed is a mixture: `flow_share` of it is
-`flow_speed_factor` times the speed of the slower half of the traffic in sight, the rest is the driver's own wish. A bold driver
-is thereby faster than those around, whoever they are, and a calm one slower; bounds keep both near what the driver
-would do on a free road [ours].
+`flow_speed_factor` times the speed of the slower half of the traffic in sight, the rest is the driver's own wish. A
+bold driver is thereby faster than those around, whoever they are, and a calm one slower; bounds keep both near what
+the driver would do on a free road [ours].
 """
 
 from __future__ import annotations
