@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 from stylesim.errors import InputError
 from stylesim.population import Population, populations
 from stylesim.style import CLASS_INTERVAL, CLASS_KNOB, PHYSICAL_FIELDS, STYLE_CLASSES, class_of_knob
-from stylesim.styles import load_calibration, road_kind, style_table
+from stylesim.styles import calibration_file, load_calibration, road_kind, style_table
 
 
 def test_every_class_sits_at_its_place_of_the_knob():
@@ -166,3 +166,17 @@ def test_a_calibration_that_does_not_fit_is_refused(tmp_path, change, says):
 
 def test_the_kind_of_road_follows_from_the_limit():
     assert [road_kind(v) for v in (None, 19.4, 22.22, 33.3)] == ["other", "other", "motorway", "motorway"]
+
+
+@pytest.mark.parametrize("backend", ["sumo", "highway"])
+def test_what_ships_as_calibrated_says_where_it_comes_from(backend):
+    path = calibration_file(backend)
+    if path is None:
+        pytest.skip(f"no calibration ships for {backend}")
+    found = load_calibration(path)
+    assert found.backend == backend
+    assert set(found.provenance) >= {"command", "scenarios", "seeds", "scaler_sha256", "versions"}
+    drawn = {name: style_table(backend).at(knob, limit_mps=33.3) for name, knob in CLASS_KNOB.items()}
+    wander = {name: style.lane_wander_m for name, style in drawn.items()}
+    assert wander["reckless"] == max(wander.values())
+    assert drawn["timid"].time_headway_s > drawn["aggressive"].time_headway_s
