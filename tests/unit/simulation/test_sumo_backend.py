@@ -115,13 +115,15 @@ def test_style_shares_are_realised(tmp_path: Path) -> None:
 
 
 def test_another_population_moves_no_departure(tmp_path: Path) -> None:
-    one = prepare_episode(YELLOW, SPECTRUM, seed=3, episode=4, folder=tmp_path).drivers
+    files = prepare_episode(YELLOW, SPECTRUM, seed=3, episode=4, folder=tmp_path)
+    one, limit = files.drivers, files.parameters["speed_limit_mps"]
     other = prepare_episode(YELLOW, Population.load("naturalistic"), seed=3, episode=4, folder=tmp_path).drivers
     assert [(d.depart_s, d.route, d.length_m) for d in one.values()] == [
         (d.depart_s, d.route, d.length_m) for d in other.values()
     ]
     assert [d.style for d in one.values()] != [d.style for d in other.values()]
-    assert next(iter(one.values())).style == SPECTRUM.draw(stream(3, 4, next(iter(one)), "style"))
+    first = next(iter(one))
+    assert one[first].style == SPECTRUM.draw(stream(3, 4, first, "style"), backend="sumo", limit_mps=limit)
 
 
 def test_flags_agree_with_counts(scenes: list[Scene]) -> None:

@@ -97,7 +97,7 @@ def test_the_green_wave_of_the_corridor_runs_at_the_speed_limit() -> None:
 
 
 def test_every_light_of_a_network_is_logged_and_asks_drivers(tmp_path: Path) -> None:
-    scenario = load_scenario("corridor").model_copy(update={"warm_up_s": 30.0, "duration_s": 90.0})
+    scenario = load_scenario("corridor").model_copy(update={"warm_up_s": 60.0, "duration_s": 150.0})
     backend = SumoBackend()
     scene = backend.run_episode(scenario, Population.load("tdbm_spectrum"), seed=4, episode=1)
     backend.close()
