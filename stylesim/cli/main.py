@@ -24,6 +24,7 @@ from stylesim.cli import (
     measuring,
     replaying,
     safety,
+    stressing,
 )
 from stylesim.cli.console import err
 from stylesim.errors import StylesimError
@@ -69,6 +70,7 @@ for module in (
     comparing,
     forecasting,
     examining,
+    stressing,
     exporting,
     describing,
     replaying,

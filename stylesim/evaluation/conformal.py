@@ -118,15 +118,26 @@ def conformal(
     )
     if known.is_empty() or judged.is_empty():
         raise InputError(f"{corpus.path}: no moving driver to calibrate on ({calibrate_on}) or to judge ({test_on})")
-    one_each = _one_window_each(known, seed)
-    pooled = conformal_radius(one_each["score"].to_numpy(), alpha)
-    groups = [ALL, *sorted(set(judged["group"].to_list()), key=value_order)]
-    regions = tuple(_region(name, one_each, judged, pooled, alpha=alpha, seed=seed) for name in groups)
+    regions, pooled = regions_of(known, judged, alpha=alpha, seed=seed)
     about = {
         "corpus": corpus_facts(corpus), "calibrate_on": calibrate_on, "test_on": test_on, "seed": seed, "modes": modes,
         "history_s": spec.history_s, "future_s": spec.future_s, "stride_s": spec.stride_s, "pooled_radius_m": pooled,
     }  # fmt: skip
     return ConformalReport(forecaster.name, by, alpha, regions, about)
+
+
+def regions_of(
+    known: pl.DataFrame, judged: pl.DataFrame, *, alpha: float = ALPHA, seed: int
+) -> tuple[tuple[Region, ...], float]:
+    """(regions, everybody first; the pooled radius in metres) from scores that are there.
+
+    Both tables have one row per window of a mover: `unit_id`, `agent_id`, `group`, `score` (its minFDE). Radii come
+    from one seeded window of every driver of `known`, coverage from all windows of `judged`.
+    """
+    one_each = _one_window_each(known, seed)
+    pooled = conformal_radius(one_each["score"].to_numpy(), alpha)
+    groups = [ALL, *sorted(set(judged["group"].to_list()), key=value_order)]
+    return tuple(_region(name, one_each, judged, pooled, alpha=alpha, seed=seed) for name in groups), pooled
 
 
 def _scores(

@@ -76,7 +76,8 @@ def evaluate(
         by=tuple(by),
         slices=all_slices(windows, tuple(by), seed=seed, within_site=within_site),
         drivers=driver_table(windows),
-        about=_about(view, spec, provenance, seed=seed, modes=modes) | {"asked_future_s": asked.future_s},
+        about=how_asked(corpus_facts(view), spec, provenance, seed=seed, modes=modes)
+        | {"asked_future_s": asked.future_s},
         counts=counts,
     )
 
@@ -92,9 +93,12 @@ def common_spec(forecasters: Sequence[Forecaster], spec: WindowSpec) -> WindowSp
     return replace(spec, future_s=reach)
 
 
-def _about(corpus: Corpus, spec: WindowSpec, provenance: Mapping[str, Any], *, seed: int, modes: int) -> dict[str, Any]:
+def how_asked(
+    corpus: Mapping[str, Any], spec: WindowSpec, provenance: Mapping[str, Any], *, seed: int, modes: int
+) -> dict[str, Any]:
+    """What an evaluation says about itself: the corpus (its facts), windows, intervals, labels, versions."""
     return {
-        "corpus": corpus_facts(corpus),
+        "corpus": dict(corpus),
         "history_s": spec.history_s,
         "future_s": spec.future_s,
         "stride_s": spec.stride_s,
