@@ -35,17 +35,23 @@ def read(
         "", "--map", help="Meanings of a table's columns (id=track,time=t,x=center_x,y=…), or the map file of a site."
     ),
     unit: str = typer.Option("", "--unit", help="Unit of a table's places: metres, feet, …, or metres per unit."),
+    workers: int = typer.Option(
+        1, min=1, help="Processes; for formats of many files. Any number gives the same bytes."
+    ),
     resume: bool = typer.Option(False, help="Go on from an unfinished run of the same request."),
 ) -> None:
     """Read a recorded data set into a new corpus; what was dropped is counted and said."""
+    from stylesim.datasets.formats import dataset_format
     from stylesim.datasets.reading import read as run
 
     options = options_of(option) | {name: value for name, value in (("map", map), ("unit", unit)) if value}
     with progress_bar(f"reading {format}", "scenes") as progress:
-        corpus = run(format, path, out=out, resume=resume, progress=progress, **options)
+        corpus = run(format, path, out=out, resume=resume, workers=workers, progress=progress, **options)
     show_table("Counted", ("what", "n"), sorted(corpus.manifest["counts"].items()))
     if format == "auto":
         say(f"recognised as {corpus.manifest['configuration']['format']}")
+    if workers > 1 and not dataset_format(corpus.manifest["configuration"]["format"]).pieces:
+        say("read by one process: the files of this format are not read alone, --workers changed nothing")
     say(f"{len(corpus)} scenes, {corpus.manifest['n_agents']} tracks, {corpus.manifest['n_steps']} agent-steps: {out}")
 
 

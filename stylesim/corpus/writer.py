@@ -124,7 +124,11 @@ class CorpusWriter:
 
     def done_parts(self) -> set[int]:
         """Numbers of the parts that are whole."""
-        return {int(path.stem) for path in (self.partial / "records").glob("*.json")}
+        return {int(path.stem) for path in self._records()}
+
+    def _records(self) -> list[Path]:
+        """The records of the parts that are whole, by number (from 100,000 on, names sort otherwise)."""
+        return sorted((self.partial / "records").glob("*.json"), key=lambda path: int(path.stem))
 
     def add(self, scene: Scene, *, split: str = "") -> None:
         """Append a scene; a part holds `part_scenes` scenes, or fewer that are large.
@@ -155,7 +159,7 @@ class CorpusWriter:
         from stylesim.corpus.corpus import Corpus
 
         self._flush()
-        records = [json.loads(p.read_bytes()) for p in sorted((self.partial / "records").glob("*.json"))]
+        records = [json.loads(p.read_bytes()) for p in self._records()]
         rows = [row for record in records for row in record["scenes"]]
         if not rows:
             raise CorpusError(f"{self.out}: nothing to write, there is no scene")

@@ -61,15 +61,19 @@ def scenes(path: str | Path) -> Iterator[Scene]:
 
     InputError where there is none, or a file is missing or damaged; it names the file.
     """
+    for folder in files(path):
+        yield _scene(folder, folder.parent.name if folder.parent.name in SPLITS else "")
+
+
+def files(path: str | Path) -> list[Path]:
+    """The scenarios' folders, each of which can be read alone; InputError as for `scenes`."""
     root = Path(path)
     if not root.is_dir():
         raise InputError(f"{root} is no folder; give a scenario's folder, a split, or the root of the data set")
-    found = False
-    for folder, split in _folders(root):
-        found = True
-        yield _scene(folder, split)
+    found = list(_folders(root))
     if not found:
         raise InputError(f"{root} holds no Argoverse 2 scenario (a folder with scenario_<id>.parquet)")
+    return found
 
 
 def sniff(path: Path) -> bool:
@@ -78,18 +82,17 @@ def sniff(path: Path) -> bool:
     return path.is_dir() and bool(matching(path, name, f"*/{name}", f"*/*/{name}"))
 
 
-def _folders(root: Path) -> Iterator[tuple[Path, str]]:
-    """Folders of scenarios in a fixed order, each with its official split ("" where the names do not say)."""
+def _folders(root: Path) -> Iterator[Path]:
+    """Folders of scenarios in a fixed order."""
     if _parquet(root) is not None:
-        yield root, root.parent.name if root.parent.name in SPLITS else ""
+        yield root
         return
     splits = [root / name for name in SPLITS if (root / name).is_dir()]
     for parent in splits or [root]:
-        split = parent.name if parent.name in SPLITS else ""
         for folder in sorted(p for p in parent.iterdir() if p.is_dir()):
             if _parquet(folder) is None:
                 raise InputError(f"{folder} has no scenario_*.parquet; the copy is incomplete, or it is something else")
-            yield folder, split
+            yield folder
 
 
 def _parquet(folder: Path) -> Path | None:

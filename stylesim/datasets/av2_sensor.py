@@ -19,7 +19,7 @@ from stylesim.datasets.av2_sensor_tables import KINDS, Boxes, boxes_of
 from stylesim.datasets.dense import checked_tracks, origin_of, size_when_seen
 from stylesim.datasets.differences import causal_velocity
 from stylesim.datasets.guarding import reading
-from stylesim.datasets.sniffing import matching
+from stylesim.datasets.sniffing import listed, matching
 from stylesim.errors import InputError
 from stylesim.scene import Scene
 from stylesim.tracks import AgentKind, TrackFlag
@@ -51,7 +51,7 @@ def sniff(path: Path) -> bool:
 def _logs(root: Path) -> Iterator[tuple[Path, str]]:
     if not root.is_dir():
         raise InputError(f"{root} is no folder; give a log's folder, a split, or the root of the data set")
-    for file in matching(root, POSES) or matching(root, f"*/{POSES}", f"*/*/{POSES}"):
+    for file in listed(root, POSES) or listed(root, f"*/{POSES}", f"*/*/{POSES}"):
         split = file.parent.parent.name
         yield file.parent, split if split in SPLITS else ""
 

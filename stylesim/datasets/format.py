@@ -33,10 +33,17 @@ class DatasetFormat:
     options: tuple[str, ...] = ()
     numbers: tuple[str, ...] = ()  # those of the options that are positive numbers
     dt_s: float = 0.1
+    pieces: Literal["", "files", "large files"] = (
+        ""  # `module.files(path)` lists what is read alone; large: many scenes
+    )
 
     def scenes(self) -> Callable[..., Iterator[Scene]]:
         """The reader's `scenes` function; its module is imported now."""
         return cast("Callable[..., Iterator[Scene]]", importlib.import_module(self.module).scenes)
+
+    def files(self, path: Path) -> list[Path]:
+        """The files (or folders) there that can be read alone, in their order; only where `pieces` says so."""
+        return cast("list[Path]", importlib.import_module(self.module).files(path))
 
     def sniff(self, path: Path) -> bool:
         """True if that file or folder looks like this format; cheap, never raises."""

@@ -6,6 +6,7 @@ FORMATS = (
     DatasetFormat(
         name="av2",
         module="stylesim.datasets.av2",
+        pieces="files",
         description="Argoverse 2 motion forecasting: 11 s scenarios of six US cities with map (Parquet, JSON)",
         supports="scenario_<id>.parquet of 16 or 18 columns with log_map_archive_<id>.json; train, val, test",
         rate_hz=10.0,
@@ -42,6 +43,7 @@ FORMATS = (
     DatasetFormat(
         name="womd",
         module="stylesim.datasets.womd",
+        pieces="large files",
         description="Waymo Open Motion: 9 s scenarios with map and lights (TFRecord)",
         supports="*tfrecord* files of Scenario protos (all versions) or of tf.Example; checksums are verified",
         rate_hz=10.0,
@@ -53,6 +55,7 @@ FORMATS = (
     DatasetFormat(
         name="gpudrive",
         module="stylesim.datasets.gpudrive",
+        pieces="files",
         description="Waymo Open Motion as the JSON of GPUDrive and Nocturne",
         supports="one JSON file per scenario; headings in radians or degrees; lanes are linked where their ends meet",
         rate_hz=10.0,
@@ -64,6 +67,7 @@ FORMATS = (
     DatasetFormat(
         name="nuplan",
         module="stylesim.datasets.nuplan",
+        pieces="large files",
         description="nuPlan: logs of automated driving in four cities, with lights (SQLite)",
         supports="<log>.db of versions 1.0 and 1.1, cut into scenes; the separate map (GeoPackage) is not read",
         rate_hz=20.0,
@@ -77,6 +81,7 @@ FORMATS = (
     DatasetFormat(
         name="scenarionet",
         module="stylesim.datasets.scenarionet",
+        pieces="files",
         description="ScenarioNet: scenarios of many data sets in MetaDrive's description (pickle)",
         supports="sd_*.pkl of a database; light states as names or numbers; pickles are read without being run",
         rate_hz=10.0,
@@ -88,6 +93,7 @@ FORMATS = (
     DatasetFormat(
         name="lyft",
         module="stylesim.datasets.lyft",
+        pieces="large files",
         description="Lyft Level 5 prediction: 25 s scenes of Palo Alto (zarr)",
         supports="zarr version 2 folders with scenes, frames, agents (blosc); no semantic map, hence no light colours",
         rate_hz=10.0,

@@ -7,7 +7,7 @@ One file is one scenario of 91 frames at 10 Hz. Sizes are one per object, headin
 from __future__ import annotations
 
 import json
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -18,7 +18,7 @@ from stylesim.datasets.dense import checked_tracks, origin_of
 from stylesim.datasets.guarding import bounded, reading
 from stylesim.datasets.light_states import light_state
 from stylesim.datasets.polyline_map import PolylineLane, PolylineMap, road_of
-from stylesim.datasets.sniffing import head, matching
+from stylesim.datasets.sniffing import head, listed, matching
 from stylesim.datasets.womd import split_of
 from stylesim.datasets.womd_scenario import DT_S, signals_of
 from stylesim.errors import InputError
@@ -37,24 +37,30 @@ _NOT_SCENARIOS = ("valid_files.json", "invalid_files.json")  # lists of names th
 
 def scenes(path: str | Path) -> Iterator[Scene]:
     """The scenarios of a JSON file, or of every one in a folder, by name. InputError names what is damaged."""
-    files = _files(Path(path))
-    if not files:
-        raise InputError(f"{path} holds no JSON file of GPUDrive or Nocturne")
-    for file in files:
+    for file in files(path):
         bounded(file, MAX_FILE_BYTES)
         with reading(file, "scenario of GPUDrive or Nocturne"):
             scene = _scene(json.loads(file.read_bytes()), file)
         yield scene
 
 
+def files(path: str | Path) -> list[Path]:
+    """The JSON files, each of which can be read alone; InputError where there is none."""
+    found = _files(Path(path), listed)
+    if not found:
+        raise InputError(f"{path} holds no JSON file of GPUDrive or Nocturne")
+    return found
+
+
 def sniff(path: Path) -> bool:
     """True for a JSON file that begins as such a scenario does, or a folder with one."""
-    start = head(_files(path)[0], 300) if _files(path) else b""
+    found = _files(path, matching)
+    start = head(found[0], 300) if found else b""
     return start.startswith(b"{") and (b'"objects": [' in start or b'"objects":[' in start)
 
 
-def _files(path: Path) -> list[Path]:
-    found = [path] if path.is_file() else matching(path, "*.json")
+def _files(path: Path, find: Callable[..., list[Path]]) -> list[Path]:
+    found = [path] if path.is_file() else find(path, "*.json")
     return [file for file in found if file.name not in _NOT_SCENARIOS and file.suffix == ".json"]
 
 

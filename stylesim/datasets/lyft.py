@@ -7,7 +7,7 @@ own, which is not read), so the lights stay out.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
 
@@ -19,7 +19,7 @@ from stylesim.datasets.dense import checked_tracks, origin_of, size_when_seen
 from stylesim.datasets.differences import causal_velocity
 from stylesim.datasets.guarding import reading
 from stylesim.datasets.lyft_records import AGENT, FRAME, SCENE, labels_of
-from stylesim.datasets.sniffing import matching
+from stylesim.datasets.sniffing import listed, matching
 from stylesim.datasets.zarr_files import RecordArray
 from stylesim.errors import InputError
 from stylesim.scene import Scene
@@ -40,10 +40,7 @@ def scenes(path: str | Path) -> Iterator[Scene]:
 
     InputError names the array or chunk that is missing or damaged; MissingDependencyError without numcodecs.
     """
-    stores = _stores(Path(path))
-    if not stores:
-        raise InputError(f"{path} is no zarr folder of Lyft with scenes, frames and agents, and holds none")
-    for store in stores:
+    for store in files(path):
         with reading(store, "zarr folder of Lyft"):
             arrays = tuple(
                 RecordArray(store / n, d) for n, d in (("scenes", SCENE), ("frames", FRAME), ("agents", AGENT))
@@ -64,13 +61,21 @@ def scenes(path: str | Path) -> Iterator[Scene]:
             yield scene
 
 
+def files(path: str | Path) -> list[Path]:
+    """The zarr folders, each of which can be read alone; InputError where there is none."""
+    found = _stores(Path(path), listed)
+    if not found:
+        raise InputError(f"{path} is no zarr folder of Lyft with scenes, frames and agents, and holds none")
+    return found
+
+
 def sniff(path: Path) -> bool:
     """True for a zarr folder with Lyft's arrays, or a folder with one."""
-    return bool(_stores(path))
+    return bool(_stores(path, matching))
 
 
-def _stores(path: Path) -> list[Path]:
-    found = [path, *matching(path, "*.zarr", "*/*.zarr")] if path.is_dir() else []
+def _stores(path: Path, find: Callable[..., list[Path]]) -> list[Path]:
+    found = [path, *find(path, "*.zarr", "*/*.zarr")] if path.is_dir() else []
     needed = ("scenes", "frames", "agents")
     return [store for store in found if all((store / name / ".zarray").is_file() for name in needed)]
 

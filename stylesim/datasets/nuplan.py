@@ -6,7 +6,7 @@ One log is one recording, cut into scenes at 10 Hz. Boxes are `lidar_box` rows; 
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import replace
 from pathlib import Path
 
@@ -17,7 +17,7 @@ from stylesim.datasets.dense import refuse_other_units
 from stylesim.datasets.guarding import reading
 from stylesim.datasets.nuplan_tables import EGO, TABLES, log_of
 from stylesim.datasets.resampling import decimated
-from stylesim.datasets.sniffing import matching
+from stylesim.datasets.sniffing import listed, matching
 from stylesim.datasets.sqlite_files import has_tables
 from stylesim.errors import InputError
 from stylesim.scene import Scene
@@ -31,10 +31,7 @@ def scenes(path: str | Path, *, scene_s: float = SCENE_S) -> Iterator[Scene]:
 
     InputError names the file that is missing, damaged, or no log.
     """
-    files = _files(Path(path))
-    if not files:
-        raise InputError(f"{path} holds no log of nuPlan (*.db)")
-    for file in files:
+    for file in files(path):
         with reading(file, "log of nuPlan"):
             log = log_of(file)
         recording = decimated(log.recording)
@@ -54,11 +51,19 @@ def scenes(path: str | Path, *, scene_s: float = SCENE_S) -> Iterator[Scene]:
             yield replace(scene, tracks=replace(tracks, flags=tracks.flags | ego))
 
 
+def files(path: str | Path) -> list[Path]:
+    """The logs, each of which can be read alone; InputError where there is none."""
+    found = _files(Path(path), listed)
+    if not found:
+        raise InputError(f"{path} holds no log of nuPlan (*.db)")
+    return found
+
+
 def sniff(path: Path) -> bool:
     """True for a log, or a folder with one."""
-    files = _files(path)
-    return bool(files) and has_tables(files[0], TABLES)
+    found = _files(path, matching)
+    return bool(found) and has_tables(found[0], TABLES)
 
 
-def _files(path: Path) -> list[Path]:
-    return [path] if path.is_file() else matching(path, "*.db", "*/*.db")
+def _files(path: Path, find: Callable[..., list[Path]]) -> list[Path]:
+    return [path] if path.is_file() else find(path, "*.db", "*/*.db")

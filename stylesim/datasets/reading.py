@@ -4,12 +4,14 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
+from contextlib import closing
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from stylesim.datasets.accounting import added, checked
 from stylesim.datasets.format import DatasetFormat
 from stylesim.datasets.formats import AUTO, dataset_format, recognised
+from stylesim.datasets.pieces import Piece, finished, in_processes, pieces, read_piece
 from stylesim.errors import InputError, unknown
 
 if TYPE_CHECKING:
@@ -22,6 +24,7 @@ def read(
     *,
     out: str | Path,
     resume: bool = False,
+    workers: int = 1,
     progress: Callable[[int, int], None] | None = None,
     **options: Any,
 ) -> Corpus:
@@ -31,30 +34,75 @@ def read(
     written, and stored in the corpus. `progress` is called with (scenes done, 0): how many there will be is not
     known before the end. `options` are the reader's own (`stylesim describe FORMAT`).
 
-    Raises InputError for an unknown format or option, a missing or damaged file, or no scene at all.
+    `workers` processes read the files of a format whose files can be read alone (`DatasetFormat.pieces`), with the
+    same bytes for any number of them; another format is read by this process, whatever `workers` is.
+
+    Raises InputError for an unknown format or option, a missing or damaged file, or no scene at all; WorkerError if a
+    process was killed. What was finished stays under `out.partial` for `resume`.
     """
     from stylesim.corpus import CorpusWriter
 
     source = Path(path)
     chosen = recognised(source) if format == AUTO else dataset_format(format)
     format = chosen.name
+    if isinstance(workers, bool) or not isinstance(workers, int) or workers < 1:
+        raise InputError(f"workers must be a whole number of at least 1, not {workers!r}")
     options = _checked_options(chosen, options)
     if not source.exists():
         raise InputError(f"{source} does not exist; {format} is to be had from {chosen.where}")
     configuration = {"format": format, "options": dict(sorted(options.items())), "licence": chosen.licence}
+    files = chosen.files(source) if chosen.pieces else []
     total: dict[str, int] = {}
     steps = 0
     with CorpusWriter(out, source=format, configuration=configuration, resume=resume) as writer:
-        for done, scene in enumerate(chosen.scenes()(source, **options), start=1):
-            writer.add(scene)
-            total = added(total, scene.counts)
-            steps += int(scene.tracks.valid.sum())
-            if progress is not None:
-                progress(done, 0)
+        if chosen.pieces:
+            about = {"root": source, "format": format, "options": options, "partial": writer.partial}
+            work = pieces(files, single=chosen.pieces == "large files", **about)
+            total, steps = _read_pieces(work, workers=workers, progress=progress or _quiet)
+        else:
+            workers = 1
+            for done, scene in enumerate(chosen.scenes()(source, **options), start=1):
+                writer.add(scene)
+                total = added(total, scene.counts)
+                steps += int(scene.tracks.valid.sum())
+                if progress is not None:
+                    progress(done, 0)
         checked(total, steps=steps, where=f"{format} {source.name}")
         if steps == 0:
             raise InputError(f"{source} gave no scene of {format}")
-        return writer.finish(run={"path": str(source)})
+        return writer.finish(run={"path": str(source), "workers": workers})
+
+
+def _quiet(done: int, total: int) -> None:
+    """Tells nobody."""
+
+
+def _read_pieces(
+    work: list[Piece], *, workers: int, progress: Callable[[int, int], None]
+) -> tuple[dict[str, int], int]:
+    """Read what is not finished yet; the sums of counts and agent-frames over all pieces."""
+    found = {piece.number: finished(piece) for piece in work}
+    waiting = [piece for piece in work if found[piece.number] is None]
+    results = [done for done in found.values() if done is not None]
+    seen = sum(done.scenes for done in results)
+
+    def one_more() -> None:
+        nonlocal seen
+        seen += 1
+        progress(seen, 0)
+
+    if workers == 1:
+        results += [read_piece(piece, one_more) for piece in waiting]
+    else:
+        with closing(in_processes(waiting, workers=workers)) as answers:
+            for done in answers:
+                results.append(done)
+                seen += done.scenes
+                progress(seen, 0)
+    total: dict[str, int] = {}
+    for done in results:
+        total = added(total, done.counts)
+    return total, sum(done.steps for done in results)
 
 
 def _checked_options(chosen: DatasetFormat, options: dict[str, Any]) -> dict[str, Any]:

@@ -7,7 +7,7 @@ names or numbers; the older form, in which a track's state is one array, is refu
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -18,7 +18,7 @@ from stylesim.datasets.guarding import bounded, reading
 from stylesim.datasets.polyline_map import road_of
 from stylesim.datasets.scenarionet_map import map_of, signals_of
 from stylesim.datasets.scenarionet_tracks import DT_S, tracks_of, units_of
-from stylesim.datasets.sniffing import head, matching
+from stylesim.datasets.sniffing import head, listed, matching
 from stylesim.errors import InputError
 from stylesim.scene import Scene
 
@@ -33,27 +33,32 @@ def scenes(path: str | Path) -> Iterator[Scene]:
 
     InputError names the file that is damaged, hostile, or of a form that is not read.
     """
-    files = _files(Path(path))
-    if not files:
-        raise InputError(f"{path} holds no scenario of ScenarioNet (*.pkl)")
-    for file in files:
+    for file in files(path):
         bounded(file, MAX_FILE_BYTES)
         with reading(file, "scenario of ScenarioNet"):
             scene = _scene(safe_pickle.loads(file.read_bytes()), file)
         yield scene
 
 
+def files(path: str | Path) -> list[Path]:
+    """The scenarios' pickles, each of which can be read alone; InputError where there is none."""
+    found = _files(Path(path), listed)
+    if not found:
+        raise InputError(f"{path} holds no scenario of ScenarioNet (*.pkl)")
+    return found
+
+
 def sniff(path: Path) -> bool:
     """True for a pickle in which the words of a scenario stand, or a folder with one."""
-    files = _files(path)
-    if not files or head(files[0], 1) != b"\x80":
+    found = _files(path, matching)
+    if not found or head(found[0], 1) != b"\x80":
         return False
-    start = head(files[0], 1 << 26)
+    start = head(found[0], 1 << 26)
     return all(mark in start for mark in _MARKS)
 
 
-def _files(path: Path) -> list[Path]:
-    found = [path] if path.is_file() else matching(path, "*.pkl", "*/*.pkl", "*/*/*.pkl")
+def _files(path: Path, find: Callable[..., list[Path]]) -> list[Path]:
+    found = [path] if path.is_file() else find(path, "*.pkl", "*/*.pkl", "*/*/*.pkl")
     return [file for file in found if file.suffix == ".pkl" and file.name not in _NOT_SCENARIOS]
 
 

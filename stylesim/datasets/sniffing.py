@@ -31,10 +31,11 @@ def header(path: Path, separator: str = ",") -> tuple[str, ...]:
     return tuple(name.strip().strip('"') for name in line.split(separator)) if line.strip() else ()
 
 
-def matching(path: Path, *patterns: str) -> list[Path]:
+def matching(path: Path, *patterns: str, at_most: int | None = LOOKED_AT) -> list[Path]:
     """The file itself if its name matches one of the patterns, else such files in the folder, sorted.
 
-    A pattern may hold a folder ("*/x.json" looks one level down). Empty where nothing can be read.
+    A pattern may hold a folder ("*/x.json" looks one level down). Empty where nothing can be read. For a look at most
+    so many files of each pattern are found; a reader, which must miss none, calls `listed`.
     """
     try:
         if path.is_file():
@@ -42,7 +43,12 @@ def matching(path: Path, *patterns: str) -> list[Path]:
             return [path] if any(path.match(name) for name in names) else []
         found: set[Path] = set()
         for pattern in patterns:
-            found.update(islice(path.glob(pattern), LOOKED_AT))
+            found.update(islice(path.glob(pattern), at_most))
         return sorted(found)
     except (OSError, ValueError):
         return []
+
+
+def listed(path: Path, *patterns: str) -> list[Path]:
+    """As `matching`, but every file, however many there are."""
+    return matching(path, *patterns, at_most=None)

@@ -20,7 +20,7 @@ from stylesim.datasets.cutting import SCENE_S, cut
 from stylesim.datasets.guarding import bounded, reading
 from stylesim.datasets.recording import Recording
 from stylesim.datasets.resampling import on_clock
-from stylesim.datasets.sniffing import header, matching
+from stylesim.datasets.sniffing import header, listed, matching
 from stylesim.datasets.table_clock import on_frames, step_s
 from stylesim.datasets.table_spec import SIDECAR, TIME_UNITS, TableSpec, sidecar_of, spec_from_file, spec_from_text
 from stylesim.datasets.tables import csv_table
@@ -64,7 +64,7 @@ def described(folder: Path) -> list[Path]:
     """The tables of a folder that say what their columns mean; InputError where there is none."""
     if not folder.is_dir():
         raise InputError(f"{folder} does not exist; give a table of tracks")
-    found = [file for file in matching(folder, *_TABLES) if sidecar_of(file).is_file()]
+    found = [file for file in listed(folder, *_TABLES) if sidecar_of(file).is_file()]
     if not found:
         raise InputError(f"{folder} holds no table with a {SIDECAR} beside it; give one table and map=x=…,y=…")
     return found

@@ -7,12 +7,12 @@ scenarios come from one drive, so each is a unit of its own; the official split 
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from pathlib import Path
 
 from stylesim.datasets import wire
 from stylesim.datasets.guarding import reading
-from stylesim.datasets.sniffing import head, matching
+from stylesim.datasets.sniffing import head, listed, matching
 from stylesim.datasets.tfrecord import HEADER_BYTES, is_header, records
 from stylesim.datasets.womd_example import scene_of_example
 from stylesim.datasets.womd_scenario import scene_of_scenario
@@ -28,10 +28,7 @@ def scenes(path: str | Path) -> Iterator[Scene]:
 
     InputError where there is none, or one is damaged; it names the file and the record.
     """
-    files = _files(Path(path))
-    if not files:
-        raise InputError(f"{path} holds no TFRecord file (*tfrecord*) of Waymo Open Motion")
-    for file in files:
+    for file in files(path):
         split = split_of(file.name)
         for number, data in enumerate(records(file)):
             where = f"scenario of Waymo Open Motion in record {number}"
@@ -45,16 +42,24 @@ def scenes(path: str | Path) -> Iterator[Scene]:
             yield scene
 
 
+def files(path: str | Path) -> list[Path]:
+    """The TFRecord files, each of which can be read alone; InputError where there is none."""
+    found = _files(Path(path), listed)
+    if not found:
+        raise InputError(f"{path} holds no TFRecord file (*tfrecord*) of Waymo Open Motion")
+    return found
+
+
 def sniff(path: Path) -> bool:
     """True for a TFRecord file with a sound first header, or a folder with one."""
-    files = [f for f in _files(path) if f.suffix != ".json"]
-    return bool(files) and is_header(head(files[0], HEADER_BYTES))
+    found = [f for f in _files(path, matching) if f.suffix != ".json"]
+    return bool(found) and is_header(head(found[0], HEADER_BYTES))
 
 
-def _files(path: Path) -> list[Path]:
+def _files(path: Path, find: Callable[..., list[Path]]) -> list[Path]:
     if path.is_file():
         return [path]
-    return [file for file in matching(path, *PATTERNS) if file.is_file() and file.suffix != ".json"]
+    return [file for file in find(path, *PATTERNS) if file.is_file() and file.suffix != ".json"]
 
 
 def split_of(name: str) -> str:
