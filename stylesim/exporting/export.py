@@ -39,7 +39,7 @@ EXPORTS = {
     for name, reads, about in (
         ("av2", "av2, UniTraj", "Argoverse 2 motion forecasting, windows of 11 s"),
         ("scenarionet", "MetaDrive, UniTraj", "a ScenarioNet database"),
-        ("womd", "Waymax", "Waymo Scenario protos in a TFRecord, windows of 9.1 s"),
+        ("womd", "Waymax, trajdata", "Waymo Scenario protos in a TFRecord, windows of 9.1 s"),
         ("gpudrive", "GPUDrive", "GPUDrive JSON, windows of 9.1 s"),
         ("commonroad", "commonroad-io", "CommonRoad XML, version 2020a"),
         ("levelx", "tools for highD's family", "CSV triples as of inD and rounD"),
