@@ -22,6 +22,7 @@ from stylesim.evaluation.slices import ALL, Slice, all_slices, cell, driver_tabl
 from stylesim.evaluation.strata import check_strata
 from stylesim.evaluation.stress_corpora import EVERYDAY, RARE, StressTraffic
 from stylesim.evaluation.stress_groups import Degradation, WorstGroup, degradation, worst_group
+from stylesim.evaluation.stress_twins import TwinForecasts, twin_forecasts
 from stylesim.evaluation.stress_windows import EVENT, NO_EVENT, POPULATION, stress_windows, traffic_facts
 from stylesim.forecast import Forecaster
 from stylesim.randomness import stream
@@ -62,6 +63,7 @@ class Stress:
     degradation: tuple[Degradation, ...]  # () for a corpus of one population
     reliability: tuple[Reliability, ...]  # everybody, then by style; () for a forecaster of one mode
     coverage: tuple[Coverage, ...]
+    twins: TwinForecasts | None = None  # None for traffic without twins
 
     @property
     def forecaster(self) -> str:
@@ -80,6 +82,7 @@ class Stress:
             "degradation": [one.to_dict() for one in self.degradation],
             "reliability": [one.to_dict() for one in self.reliability],
             "coverage": [one.to_dict() for one in self.coverage],
+            "twins": None if self.twins is None else self.twins.to_dict(),
         }
 
     def save(self, stem: str | Path) -> Path:
@@ -133,6 +136,7 @@ def stress(
         degradation=degradation(moving, seed=seed),
         reliability=_reliabilities(moving, seed, modes),
         coverage=_coverages(moving, traffic, seed),
+        twins=twin_forecasts(forecaster, traffic.twins, spec=spec, modes=modes, seed=seed, beside=beside),
     )
 
 

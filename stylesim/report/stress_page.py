@@ -58,7 +58,8 @@ def save_stress(found: Sequence[Stress], page: str | Path) -> Path:
     about = found[0].evaluation.about
     sections = [
         errors_section(evaluations, seed=int(about["intervals"]["seed"])),
-        _worst_section(found), _events_section(found), _calibration_section(found), *_extra(found),
+        _worst_section(found), _events_section(found), _calibration_section(found),
+        *_twins_section(found), *_extra(found),
     ]  # fmt: skip
     lead = (
         f"{plural(len(found), 'forecaster')}; {about['corpus']['scenes']} scenes of {about['corpus']['name']}; "
@@ -68,6 +69,27 @@ def save_stress(found: Sequence[Stress], page: str | Path) -> Path:
     html = render("Forecasts under stress", lead, sections, warnings(evaluations), [finding(one) for one in found])
     write_whole(path, html.encode())
     return path
+
+
+def _twins_section(found: Sequence[Stress]) -> list[Section]:
+    """One row per forecaster; no section without twins."""
+    rows = []
+    for one in found:
+        if one.twins is not None:
+            same = Cell(f"{one.twins.identical} of {one.twins.drivers}", look="number")
+            names = ("covers_own", "covers_twin", "covers_both", "apart_m")
+            rows.append(
+                (Cell(one.forecaster, look="head"), same, *(estimate_cell(one.twins.figures[n]) for n in names))
+            )
+    if not rows:
+        return []
+    heads = ("forecaster", "same forecast", "own future covered", "twin's covered", "both covered", "ends apart (m)")
+    table = Table("Drivers whose style was switched at t0", heads, tuple(rows))
+    text = (
+        "One past, two futures: at t0 the driver becomes another person. The histories are the same to the last bit, "
+        "so a forecaster that is not told the style must say the same. Covered: a mode ends within 2 m."
+    )
+    return [Section("twins", "Counterfactual twins", (text,), (Block(table=table),))]
 
 
 def _extra(found: Sequence[Stress]) -> list[Section]:
