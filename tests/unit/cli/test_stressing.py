@@ -1,4 +1,4 @@
-"""`stress` as a user meets it, on a corpus of his own (simulating takes minutes: tests/unit/simulation has that)."""
+"""`stress` as a user meets it, on a corpus of his own (simulating the edge cases takes minutes)."""
 
 from __future__ import annotations
 
