@@ -33,6 +33,7 @@ _HOME = {
     "TDBM": "stylesim.labelers.tdbm",
     "Tracks": "stylesim.tracks",
     "WindowSpec": "stylesim.windows",
+    "analyze": "stylesim.evaluation.analysis.analyze",
     "balance": "stylesim.merging.balance",
     "criticality": "stylesim.evaluation.criticality",
     "evaluate": "stylesim.report.evaluate",

@@ -12,6 +12,7 @@ from typer.core import TyperGroup
 
 from stylesim import __version__
 from stylesim.cli import (
+    analyzing,
     calibrating,
     comparing,
     corpora,
@@ -68,6 +69,7 @@ for module in (
     measuring,
     safety,
     comparing,
+    analyzing,
     forecasting,
     examining,
     stressing,

@@ -1,0 +1,1 @@
+"""The paper's analysis of styles in data sets, for any corpora: `analyze.analyze`."""
