@@ -6,12 +6,12 @@ from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
-import polars as pl
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from stylesim.evaluation.analysis.kinematics import QUANTITIES
 from stylesim.evaluation.analysis.shares import NAMES, ORIENTATIONS
+from stylesim.evaluation.analysis.tables import Frame, known, where
 from stylesim.report.theme import SERIES_COLOUR, SERIES_MARKER, drawing, new_figure, style_colour
 from stylesim.style import STYLE_CLASSES
 
@@ -25,7 +25,7 @@ def look(number: int) -> tuple[str, str]:
     return SERIES_COLOUR[number % len(SERIES_COLOUR)], SERIES_MARKER[number % len(SERIES_MARKER)]
 
 
-def _corpora(table: pl.DataFrame) -> list[str]:
+def _corpora(table: Frame) -> list[str]:
     return list(dict.fromkeys(table["corpus"].to_list()))
 
 
@@ -36,7 +36,7 @@ def _whisker(axes: Axes, row: dict[str, Any], y: float, number: int, *, scale: f
     axes.plot(scale * row["value"], y, marker, color=colour, mfc="white" if within else colour, ms=5)
 
 
-def shares_figure(table: pl.DataFrame) -> Figure:
+def shares_figure(table: Frame) -> Figure:
     """Share of each class per corpus with its 95 % interval, both orientations side by side."""
     corpora = _corpora(table)
     with drawing():
@@ -44,7 +44,7 @@ def shares_figure(table: pl.DataFrame) -> Figure:
         step = 0.8 / len(corpora)
         for axes, orientation in zip(panels, ORIENTATIONS, strict=True):
             for number, corpus in enumerate(corpora):
-                own = table.filter((pl.col("corpus") == corpus) & (pl.col("orientation") == orientation))
+                own = where(table, corpus=corpus, orientation=orientation)
                 n = own["n_drivers"][0]
                 axes.plot([], [], look(number)[1], color=look(number)[0], label=f"{corpus}, n = {n}")
                 for row in own.iter_rows(named=True):
@@ -64,16 +64,16 @@ def shares_figure(table: pl.DataFrame) -> Figure:
     return figure
 
 
-def boxes_figure(table: pl.DataFrame, corpus: str) -> Figure | None:
+def boxes_figure(table: Frame, corpus: str) -> Figure | None:
     """Box plots of the kinematics per class: median, quartiles, whiskers at 5 and 95 %; None where all are refused."""
-    own = table.filter(pl.col("corpus") == corpus)
+    own = where(table, corpus=corpus)
     if (own["status"] == "too few").all():
         return None
     with drawing():
         figure = Figure(figsize=(WIDTH, 4.9), layout="constrained")
         panels = figure.subplots(2, 4).ravel()
         for axes, (name, (title, unit, circular)) in zip(panels, QUANTITIES.items(), strict=True):
-            for row in own.filter(pl.col("quantity") == name).iter_rows(named=True):
+            for row in where(own, quantity=name).iter_rows(named=True):
                 x = STYLE_CLASSES.index(row["class"])
                 if row["status"] == "too few":
                     axes.annotate("too few", (x, 0.03), xycoords=("data", "axes fraction"), rotation=90, ha="center",
@@ -91,16 +91,16 @@ def boxes_figure(table: pl.DataFrame, corpus: str) -> Figure | None:
             bottom = axes in panels[4:]
             axes.set_xticks(range(len(STYLE_CLASSES)), STYLE_CLASSES if bottom else [""] * len(STYLE_CLASSES),
                             rotation=60, ha="right", rotation_mode="anchor", fontsize=7.5)  # fmt: skip
-        sizes = own.filter(pl.col("quantity") == "mean_speed").select("class", "n_drivers").iter_rows()
+        sizes = where(own, quantity="mean_speed").select("class", "n_drivers").iter_rows()
         figure.suptitle(
             f"{corpus}: " + ", ".join(f"{style} {n}" for style, n in sizes), fontsize=8.5, x=0.01, ha="left"
         )
     return figure
 
 
-def stability_figure(table: pl.DataFrame) -> Figure | None:
+def stability_figure(table: Frame) -> Figure | None:
     """ICC(1) of a and kappa of the class between windows of one driver, all contexts; None where all are refused."""
-    shown = table.filter((pl.col("context") == "all") & pl.col("value").is_not_null())
+    shown = where(table, context="all") & pl.col("value").is_not_null())
     if not shown.height:
         return None
     figures = list(dict.fromkeys(shown["figure"].to_list()))
@@ -110,7 +110,7 @@ def stability_figure(table: pl.DataFrame) -> Figure | None:
         figure, panels = new_figure(WIDTH, 1.5 + 0.16 * len(figures) * len(corpora), columns=len(lengths))
         for axes, length in zip(panels, lengths, strict=True):
             step = 0.8 / len(corpora)
-            for row in shown.filter(pl.col("window_s") == length).iter_rows(named=True):
+            for row in where(shown, window_s=length).iter_rows(named=True):
                 number = corpora.index(row["corpus"])
                 y = figures.index(row["figure"]) - 0.4 + step * (number + 0.5)
                 _whisker(axes, row, y, number, within=row["status"] == "within site")
@@ -124,9 +124,9 @@ def stability_figure(table: pl.DataFrame) -> Figure | None:
     return figure
 
 
-def shift_figure(table: pl.DataFrame) -> Figure | None:
+def shift_figure(table: Frame) -> Figure | None:
     """Held-out minus training share of each class, both orientations; None where all are refused."""
-    shown = table.filter(pl.col("value").is_not_null()) if table.height else table
+    shown = known(table, "value") if table.height else table
     if not shown.height:
         return None
     pairs = list(dict.fromkeys(zip(shown["corpus"].to_list(), shown["part"].to_list(), strict=True)))
@@ -134,7 +134,7 @@ def shift_figure(table: pl.DataFrame) -> Figure | None:
         figure, panels = new_figure(WIDTH, 1.6 + 0.16 * len(NAMES) * max(2, len(pairs)), columns=2)
         step = 0.8 / len(pairs)
         for axes, orientation in zip(panels, ORIENTATIONS, strict=True):
-            for row in shown.filter(pl.col("orientation") == orientation).iter_rows(named=True):
+            for row in where(shown, orientation=orientation).iter_rows(named=True):
                 number = pairs.index((row["corpus"], row["part"]))
                 y = NAMES.index(row["class"]) - 0.4 + step * (number + 0.5)
                 _whisker(axes, row, y, number, scale=100, within=row["status"] == "within site")
@@ -154,9 +154,9 @@ def _legend(figure: Figure, axes: Axes, names: Sequence[str]) -> None:
     figure.legend(*axes.get_legend_handles_labels(), loc="outside lower center", ncols=min(4, len(names)))
 
 
-def answers_figure(table: pl.DataFrame, corpus: str) -> Figure:
+def answers_figure(table: Frame, corpus: str) -> Figure:
     """MDSI style (columns) against TDBM class (rows), drivers in each cell (the paper's heat map)."""
-    own = table.filter(pl.col("corpus") == corpus)
+    own = where(table, corpus=corpus)
     mdsi, tdbm = (list(dict.fromkeys(own[c].to_list())) for c in ("mdsi", "tdbm"))
     count = np.zeros((len(tdbm), len(mdsi)), np.int64)
     for row in own.iter_rows(named=True):

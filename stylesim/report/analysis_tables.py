@@ -5,9 +5,9 @@ from __future__ import annotations
 import math
 from typing import Any
 
-import polars as pl
 
 from stylesim.evaluation.analysis.kinematics import QUANTITIES
+from stylesim.evaluation.analysis.tables import Frame, where
 from stylesim.report.tables import EM, Cell, Table, number
 
 Row = dict[str, Any]
@@ -40,20 +40,20 @@ def size_cell(row: Row) -> Cell:
     return Cell(str(row["n_drivers"]), f"{row['n_units']} unit" + ("" if row["n_units"] == 1 else "s"), "number")
 
 
-def firmness_table(table: pl.DataFrame) -> Table:
+def firmness_table(table: Frame) -> Table:
     """Without neighbours, clamped, margins: one row per figure, a column per corpus."""
     corpora = list(dict.fromkeys(table["corpus"].to_list()))
     rows = []
     for figure in dict.fromkeys(table["figure"].to_list()):
         cells = []
         for corpus in corpora:
-            row = table.filter((pl.col("corpus") == corpus) & (pl.col("figure") == figure)).row(0, named=True)
+            row = where(table, corpus=corpus, figure=figure).row(0, named=True)
             cells.append(value_cell(row, scale=1.0 if figure.startswith("margin, ") else 100))
         rows.append((Cell(figure if figure.startswith("margin, ") else f"{figure} (%)", look="head"), *cells))
     return Table("How firm the classes are, with 95 % intervals", ("figure", *corpora), tuple(rows))
 
 
-def pairs_table(table: pl.DataFrame) -> Table:
+def pairs_table(table: Frame) -> Table:
     """The paper's tests, beside effect sizes."""
     rows = tuple(
         (
@@ -69,7 +69,7 @@ def pairs_table(table: pl.DataFrame) -> Table:
     return Table("Every two classes of 30 drivers or more, same tracks as the label: descriptive", heads, rows)
 
 
-def halves_table(table: pl.DataFrame) -> Table:
+def halves_table(table: Frame) -> Table:
     """The judged test."""
     rows = []
     for row in table.iter_rows(named=True):
@@ -84,7 +84,7 @@ def halves_table(table: pl.DataFrame) -> Table:
     return Table("Class of a track’s first half, kinematics of its second; permuted within scenes", heads, tuple(rows))
 
 
-def stability_table(table: pl.DataFrame) -> Table:
+def stability_table(table: Frame) -> Table:
     """ICC and kappa by context."""
     rows = tuple(
         (Cell(row["corpus"], f"{row['window_s']:g} s windows", "head"), Cell(row["context"]), Cell(row["figure"]),
@@ -95,7 +95,7 @@ def stability_table(table: pl.DataFrame) -> Table:
     return Table("Non-overlapping windows of one driver, by context", heads, rows)
 
 
-def speed_table(table: pl.DataFrame) -> Table:
+def speed_table(table: Frame) -> Table:
     """Mean speed between clusters and between parts."""
     rows = tuple(
         (Cell(row["corpus"], look="head"), Cell(row["comparison"], row["of"]),
@@ -108,21 +108,21 @@ def speed_table(table: pl.DataFrame) -> Table:
     )
 
 
-def kdsc_tdbm_table(table: pl.DataFrame) -> Table:
+def kdsc_tdbm_table(table: Frame) -> Table:
     """Share of KDSC's aggressive cluster in every TDBM class."""
     corpora = list(dict.fromkeys(table["corpus"].to_list()))
     rows = []
     for style in dict.fromkeys(table["class"].to_list()):
         cells = []
         for corpus in corpora:
-            row = table.filter((pl.col("corpus") == corpus) & (pl.col("class") == style)).row(0, named=True)
+            row = where(table, corpus=corpus, class=style).row(0, named=True)
             cell = value_cell(row, scale=1.0 if "V" in style else 100)
             cells.append(Cell(cell.text, f"{cell.note} n = {row['n_drivers']}".strip(), cell.look))
         rows.append((Cell(style if "V" in style else f"{style} (%)", look="head"), *cells))
     return Table("KDSC aggressive among the drivers of each TDBM class", ("TDBM class", *corpora), tuple(rows))
 
 
-def sensitivity_table(table: pl.DataFrame) -> Table:
+def sensitivity_table(table: Frame) -> Table:
     """What changes when the same drivers are measured or scaled otherwise."""
     rows = []
     for row in table.iter_rows(named=True):

@@ -5,13 +5,13 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-import polars as pl
 from matplotlib.figure import Figure
 from matplotlib.patches import Polygon
 
 from stylesim.evaluation.analysis.clusters import CLUSTERS
 from stylesim.evaluation.analysis.examples import Example
 from stylesim.evaluation.analysis.parts import TRAIN, held_out_of
+from stylesim.evaluation.analysis.tables import Frame, known, where
 from stylesim.evaluation.intervals import MIN_DRIVERS
 from stylesim.report.theme import drawing, style_colour
 
@@ -20,12 +20,12 @@ SPEED_BINS = 24  # chosen: about 1 m/s wide in towns
 COLOUR = {"aggressive": "#E69F00", "normal": "#0072B2"}  # orange and blue, as in the paper's figure
 
 
-def speeds_figure(drivers: pl.DataFrame, corpora: Sequence[str]) -> Figure | None:
+def speeds_figure(drivers: Frame, corpora: Sequence[str]) -> Figure | None:
     """Densities of mean speed per cluster: training above, held out below, one column per corpus.
 
     A cluster of fewer than 30 drivers is not drawn. None where no corpus has clusters.
     """
-    named = drivers.filter(pl.col("kdsc").is_not_null())
+    named = known(drivers, "kdsc")
     shown = [c for c in corpora if (named["corpus"] == c).any()]
     if not shown:
         return None
@@ -33,13 +33,13 @@ def speeds_figure(drivers: pl.DataFrame, corpora: Sequence[str]) -> Figure | Non
         figure = Figure(figsize=(min(WIDTH, 2.9 * max(2, len(shown))), 4.2), layout="constrained")
         grid = figure.subplots(2, len(shown), squeeze=False, sharex="col")
         for column, corpus in enumerate(shown):
-            own = named.filter(pl.col("corpus") == corpus)
+            own = where(named, corpus=corpus)
             others = held_out_of(set(own["part"].to_list()))
             held = "test" if "test" in others else (others[0] if others else "held out")
             edges = np.linspace(0, float(np.ceil(own["mean_speed"].max() or 1.0)), SPEED_BINS + 1)  # type: ignore[arg-type]
             for axes, part in zip(grid[:, column], (TRAIN, held), strict=True):
                 for cluster in CLUSTERS:
-                    value = own.filter((pl.col("part") == part) & (pl.col("kdsc") == cluster))["mean_speed"].to_numpy()
+                    value = where(own, part=part, kdsc=cluster)["mean_speed"].to_numpy()
                     label = f"{cluster}, n = {len(value)}"
                     if len(value) < MIN_DRIVERS:
                         axes.plot([], [], color=COLOUR[cluster], label=f"{label}: too few")
