@@ -100,7 +100,7 @@ def boxes_figure(table: Frame, corpus: str) -> Figure | None:
 
 def stability_figure(table: Frame) -> Figure | None:
     """ICC(1) of a and kappa of the class between windows of one driver, all contexts; None where all are refused."""
-    shown = where(table, context="all") & pl.col("value").is_not_null())
+    shown = known(where(table, context="all"), "value")
     if not shown.height:
         return None
     figures = list(dict.fromkeys(shown["figure"].to_list()))

@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 from typing import Any
 
-
 from stylesim.evaluation.analysis.kinematics import QUANTITIES
 from stylesim.evaluation.analysis.tables import Frame, where
 from stylesim.report.tables import EM, Cell, Table, number
@@ -115,7 +114,7 @@ def kdsc_tdbm_table(table: Frame) -> Table:
     for style in dict.fromkeys(table["class"].to_list()):
         cells = []
         for corpus in corpora:
-            row = where(table, corpus=corpus, class=style).row(0, named=True)
+            row = where(table, corpus=corpus, **{"class": style}).row(0, named=True)
             cell = value_cell(row, scale=1.0 if "V" in style else 100)
             cells.append(Cell(cell.text, f"{cell.note} n = {row['n_drivers']}".strip(), cell.look))
         rows.append((Cell(style if "V" in style else f"{style} (%)", look="head"), *cells))
