@@ -20,6 +20,7 @@ from stylesim.datasets.av2_map import read_map
 from stylesim.datasets.av2_tables import N_FRAMES, AvTable, table_of
 from stylesim.datasets.dense import refuse_other_units
 from stylesim.datasets.flagging import flagged_implausible
+from stylesim.datasets.sizes import nominal_sizes
 from stylesim.datasets.sniffing import matching
 from stylesim.errors import InputError
 from stylesim.geometry import wrap_angle
@@ -42,17 +43,6 @@ KINDS = {
     "riderless_bicycle": AgentKind.STATIC,
     "background": AgentKind.OTHER,
     "unknown": AgentKind.OTHER,
-}
-# The format gives no sizes. Chosen: common sizes of each kind (a mid-size car, a 12 m bus, a rider, a person), so
-# that bumper-to-bumper gaps are right on average.
-NOMINAL_SIZE_M = {
-    AgentKind.CAR: (4.6, 1.9),
-    AgentKind.BUS: (12.0, 2.55),
-    AgentKind.MOTORCYCLE: (2.2, 0.8),
-    AgentKind.BICYCLE: (1.8, 0.6),
-    AgentKind.PEDESTRIAN: (0.6, 0.6),
-    AgentKind.STATIC: (1.0, 1.0),
-    AgentKind.OTHER: (1.0, 1.0),
 }
 
 
@@ -141,7 +131,7 @@ def _tracks(table: AvTable, origin_m: Float64[np.ndarray, " 2"], n_frames: int) 
     return Tracks(
         agent_id=table.agent_id,
         kind=kind,
-        size_m=np.array([NOMINAL_SIZE_M[AgentKind(k)] for k in kind.tolist()], np.float32),
+        size_m=nominal_sizes(kind),  # the format gives none
         position_m=position,
         velocity_mps=velocity,
         heading_rad=heading,
