@@ -11,11 +11,12 @@ from pathlib import Path
 from typing import Any
 
 from stylesim.corpus.files import inside
+from stylesim.corpus.finishing import SCENE_SCHEMA
 from stylesim.corpus.label_store import has_labels, read_labels, write_labels
 from stylesim.corpus.roads import read_road
 from stylesim.corpus.tables import part_tables, read_parquet, tracks_and_signals
 from stylesim.corpus.weight_store import read_weights, write_weights
-from stylesim.corpus.writer import FORMAT, SCENE_SCHEMA, SCHEMA_VERSION
+from stylesim.corpus.writer import FORMAT, SCHEMA_VERSION
 from stylesim.errors import CorpusError, InputError, nearest
 from stylesim.labels import StyleLabels
 from stylesim.road import Road

@@ -12,7 +12,7 @@ import numpy as np
 import polars as pl
 
 from stylesim.corpus.files import json_bytes, sha256_of, write_whole
-from stylesim.corpus.label_file import LabelFile
+from stylesim.corpus.table_file import TableFile
 from stylesim.corpus.tables import read_parquet
 from stylesim.errors import CorpusError, InputError
 from stylesim.labels import UNDETERMINED, StyleLabels
@@ -79,7 +79,7 @@ def write_labels(
             key = (chunk.method, chunk.span)
             if key not in files:
                 stem = _stem(corpus, *key)
-                files[key] = _Growing(LabelFile(stem.with_name(stem.name + ".parquet")), source_scenario, chunk)
+                files[key] = _Growing(TableFile(stem.with_name(stem.name + ".parquet")), source_scenario, chunk)
             files[key].add(chunk)
         if not files:
             raise CorpusError(f"{corpus}: there is nothing to label")
@@ -94,7 +94,7 @@ def write_labels(
 class _Growing:
     """Labels on their way to one file, a table for many small chunks: making one takes longer than filling it."""
 
-    def __init__(self, file: LabelFile, source_scenario: Mapping[str, str], first: StyleLabels) -> None:
+    def __init__(self, file: TableFile, source_scenario: Mapping[str, str], first: StyleLabels) -> None:
         self.file, self.source_scenario = file, source_scenario
         self.kind = first.rows(np.zeros(0, np.int64))  # what all have in common
         self._waiting: list[StyleLabels] = []

@@ -75,7 +75,7 @@ def road_from_dict(raw: dict[str, Any]) -> Road:
 def write_road(folder: Path, road: Road) -> str:
     """Write the road under its content's hash unless it is there; returns its name."""
     plain = json.dumps(road_to_dict(road), sort_keys=True, separators=(",", ":"), allow_nan=False).encode()
-    name = hashlib.sha256(plain).hexdigest()[:20]
+    name = _name(plain)
     path = folder / f"{name}.json.gz"
     if not path.exists():
         write_whole(path, gzip.compress(plain, compresslevel=6, mtime=0))
@@ -84,13 +84,30 @@ def write_road(folder: Path, road: Road) -> str:
 
 def read_road(path: Path) -> Road:
     """The road in that file. CorpusError if it is missing or damaged."""
+    plain = _unpacked(path)
+    try:
+        return road_from_dict(json.loads(plain))
+    except (ValueError, KeyError, TypeError) as error:
+        raise CorpusError(f"{path} is damaged: {error}") from error
+
+
+def content_hash(path: Path) -> str:
+    """What the name of that file must begin with. CorpusError if it is missing or damaged."""
+    return _name(_unpacked(path))
+
+
+def _name(plain: bytes) -> str:
+    return hashlib.sha256(plain).hexdigest()[:20]
+
+
+def _unpacked(path: Path) -> bytes:
     try:
         with gzip.open(path, "rb") as file:
             plain = file.read(_MAX_BYTES + 1)
-        if len(plain) > _MAX_BYTES:
-            raise ValueError("it unpacks to more than 1 GiB")
-        return road_from_dict(json.loads(plain))
     except FileNotFoundError:
         raise CorpusError(f"{path} is missing; the corpus is incomplete") from None
-    except (OSError, EOFError, ValueError, KeyError, TypeError, zlib.error) as error:
+    except (OSError, EOFError, zlib.error) as error:
         raise CorpusError(f"{path} is damaged: {error}") from error
+    if len(plain) > _MAX_BYTES:
+        raise CorpusError(f"{path} is damaged: it unpacks to more than 1 GiB")
+    return plain

@@ -24,14 +24,14 @@ ROW_GROUP = 1 << 18  # fixed: the bytes must not depend on the machine
 LEVEL = 9  # of zstd; chosen: 3 % smaller than 3, and encoding is still a small part of a simulation's time
 
 
-def parquet_bytes(frame: pl.DataFrame, about: dict[str, str] | None = None) -> bytes:
+def parquet_bytes(frame: pl.DataFrame, about: dict[str, str] | None = None, *, row_group: int = ROW_GROUP) -> bytes:
     """The table as Parquet, always with the same bytes for the same table and polars version.
 
     `about` goes into the schema metadata of the file.
     """
     buffer = io.BytesIO()
     frame.write_parquet(
-        buffer, compression="zstd", compression_level=LEVEL, row_group_size=ROW_GROUP, statistics=False, metadata=about
+        buffer, compression="zstd", compression_level=LEVEL, row_group_size=row_group, statistics=False, metadata=about
     )
     return buffer.getvalue()
 

@@ -9,6 +9,7 @@ from pathlib import Path
 
 from stylesim.corpus.corpus import Corpus
 from stylesim.corpus.files import inside, sha256_of
+from stylesim.corpus.roads import content_hash
 from stylesim.errors import CorpusError
 from stylesim.plausibility import implausible, overlapping_pairs
 from stylesim.scene import Scene
@@ -39,10 +40,26 @@ def _checksums(corpus: Corpus) -> list[str]:
             errors.append(f"{name}: missing")
         elif sha256_of(path) != digest:
             errors.append(f"{name}: sha256 differs from corpus.json")
-    for folder in ("tracks", "agents", "signals", "roads"):
+    for folder in ("tracks", "agents", "signals"):
         extra = {f"{folder}/{p.name}" for p in (corpus.path / folder).glob("*")} - known
         errors += [f"{name}: not listed in corpus.json" for name in sorted(extra)]
     return errors
+
+
+def _roads(corpus: Corpus) -> list[str]:
+    """Roads are named by their content, and the scene table (whose checksum is right) names them."""
+    errors = []
+    known = {f"{info.road}.json.gz" for info in corpus.info if info.road}
+    for name in sorted(known):
+        try:
+            content = content_hash(inside(corpus.path, f"roads/{name}"))
+        except CorpusError as error:
+            errors.append(str(error))
+            continue
+        if content != name.split(".", 1)[0]:
+            errors.append(f"roads/{name}: its content is not what its name says")
+    extra = {path.name for path in (corpus.path / "roads").glob("*")} - known
+    return errors + [f"roads/{name}: no scene names it" for name in sorted(extra)]
 
 
 def _physics(scene: Scene, counts: Counter[str]) -> list[str]:
@@ -68,9 +85,10 @@ def verify(path: str | Path, *, progress: Callable[[int, int], None] | None = No
     corpus = Corpus(path)
     errors = _checksums(corpus)
     counts: Counter[str] = Counter()
-    if errors:
-        return Verification(tuple(errors), dict(counts))
     try:
+        errors += [] if errors else _roads(corpus)
+        if errors:
+            return Verification(tuple(errors), dict(counts))
         for done, (info, scene) in enumerate(zip(corpus.info, corpus, strict=True), start=1):
             steps = int(scene.tracks.valid.sum())
             if steps != info.n_steps:

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import json
+import os
 import shutil
-from collections import Counter
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from types import TracebackType
@@ -13,10 +13,11 @@ from typing import TYPE_CHECKING, Any
 import polars as pl
 
 from stylesim.corpus.codec import HEADING_RAD, POSITION_M, VELOCITY_MPS
-from stylesim.corpus.files import json_bytes, new_folder, sha256_of, storage_error, write_whole
+from stylesim.corpus.files import json_bytes, new_folder, storage_error, write_whole
+from stylesim.corpus.finishing import Sums, brought_together, records_of
 from stylesim.corpus.roads import write_road
 from stylesim.corpus.tables import DRIVER_PARAMETERS, SCALES, agents_table, parquet_bytes, signals_table, tracks_table
-from stylesim.errors import CorpusError, InputError
+from stylesim.errors import InputError
 from stylesim.scene import Scene
 from stylesim.version import __version__
 
@@ -24,17 +25,11 @@ if TYPE_CHECKING:
     from stylesim.corpus.corpus import Corpus
 
 FORMAT = "stylesim-corpus"
-SCHEMA_VERSION = 2  # 2 added twin_of, replay_of and metadata to the scenes
+FOLDERS = ("tracks", "agents", "signals", "roads")
+# 2 added twin_of, replay_of and metadata to the scenes; 3 lists no roads, whose names are the hashes of their content.
+SCHEMA_VERSION = 3
 PART_STEPS = 250_000  # agent-frames after which a part is closed: memory does not depend on how large scenes are
 VERSIONS = {"stylesim": __version__, "polars": pl.__version__}
-SCENE_SCHEMA = {
-    "scene_id": pl.String, "unit_id": pl.String, "source": pl.String, "scenario": pl.String,
-    "source_scenario_id": pl.String, "official_split": pl.String, "split": pl.String, "start_s": pl.Float64,
-    "dt_s": pl.Float64, "n_frames": pl.Int32, "n_agents": pl.Int32, "n_steps": pl.Int64, "t0_frame": pl.Int32,
-    "part": pl.Int32, "number": pl.Int32, "road": pl.String, "origin_x_m": pl.Float64, "origin_y_m": pl.Float64,
-    "counts": pl.String, "parameters": pl.String, "signals": pl.String, "twin_of": pl.String, "replay_of": pl.String,
-    "metadata": pl.String,
-}  # fmt: skip
 
 
 def _scene_row(scene: Scene, split: str, part: int, number: int, road: str) -> dict[str, Any]:
@@ -124,11 +119,7 @@ class CorpusWriter:
 
     def done_parts(self) -> set[int]:
         """Numbers of the parts that are whole."""
-        return {int(path.stem) for path in self._records()}
-
-    def _records(self) -> list[Path]:
-        """The records of the parts that are whole, by number (from 100,000 on, names sort otherwise)."""
-        return sorted((self.partial / "records").glob("*.json"), key=lambda path: int(path.stem))
+        return {int(path.stem) for path in records_of(self.partial)}
 
     def add(self, scene: Scene, *, split: str = "") -> None:
         """Append a scene; a part holds `part_scenes` scenes, or fewer that are large.
@@ -159,31 +150,17 @@ class CorpusWriter:
         from stylesim.corpus.corpus import Corpus
 
         self._flush()
-        records = [json.loads(p.read_bytes()) for p in self._records()]
-        rows = [row for record in records for row in record["scenes"]]
-        if not rows:
-            raise CorpusError(f"{self.out}: nothing to write, there is no scene")
-        twice = [scene_id for scene_id, n in Counter(row["scene_id"] for row in rows).items() if n > 1]
-        if twice:
-            raise CorpusError(f"{self.out}: scene_id {twice[0]!r} occurs {len(twice)} time(s) too often")
-        files = {name: digest for record in records for name, digest in record["files"].items()}
-        table = pl.DataFrame(rows, schema=SCENE_SCHEMA, orient="row")
-        files["scenes.parquet"] = write_whole(self.partial / "scenes.parquet", parquet_bytes(table))
-        for road in sorted({row["road"] for row in rows} - {""}):
-            files[f"roads/{road}.json.gz"] = sha256_of(self.partial / "roads" / f"{road}.json.gz")
+        sums = brought_together(self.partial, records_of(self.partial))
         if weights:
             ids = sorted(weights)
             weight = pl.DataFrame(
                 {"scene_id": [s for s, _ in ids], "agent_id": [a for _, a in ids], "weight": [weights[i] for i in ids]}
             )
-            files["weights.parquet"] = write_whole(self.partial / "weights.parquet", parquet_bytes(weight))
-        total: Counter[str] = Counter()
-        for row in rows:
-            total.update(json.loads(row["counts"]))
-        self._write_manifest(rows, files, {**total, **(counts or {})})
+            sums.files["weights.parquet"] = write_whole(self.partial / "weights.parquet", parquet_bytes(weight))
+        self._write_manifest(sums, {**sums.counts, **(counts or {})})
         write_whole(self.partial / "run.json", json_bytes(dict(run or {})))
-        for stray in self.partial.rglob(".*.tmp"):  # left by a writer that was killed
-            stray.unlink()
+        for folder in (self.partial, *(self.partial / name for name in FOLDERS)):
+            _remove_strays(folder)
         try:
             self.partial.rename(self.out)
         except OSError as error:
@@ -192,13 +169,26 @@ class CorpusWriter:
         (self.out / "request.json").unlink()
         return Corpus(self.out)
 
-    def _write_manifest(self, rows: list[dict[str, Any]], files: dict[str, str], counts: Mapping[str, int]) -> None:
+    def _write_manifest(self, sums: Sums, counts: Mapping[str, int]) -> None:
         manifest = {
-            "format": FORMAT, "schema_version": SCHEMA_VERSION, **self._request, "counts": dict(counts), "files": files,
-            "n_scenes": len(rows), "n_agents": sum(row["n_agents"] for row in rows),
-            "n_steps": sum(row["n_steps"] for row in rows), "dt_s": sorted({row["dt_s"] for row in rows}),
+            "format": FORMAT, "schema_version": SCHEMA_VERSION, **self._request, "counts": dict(counts),
+            "files": sums.files, "n_scenes": sums.n_scenes, "n_agents": sums.n_agents, "n_steps": sums.n_steps,
+            "dt_s": sorted(sums.dt_s),
             "scales": {"position_m": POSITION_M, "velocity_mps": VELOCITY_MPS, "heading_rad": HEADING_RAD},
             "driver_parameters": list(DRIVER_PARAMETERS),
             "versions": VERSIONS,
         }  # fmt: skip
         write_whole(self.partial / "corpus.json", json_bytes(manifest))
+
+
+def _remove_strays(folder: Path) -> None:
+    """Remove what a writer that was killed left; entry by entry, for a folder may hold millions."""
+    if not folder.is_dir():
+        return
+    with os.scandir(folder) as entries:
+        strays = [Path(entry.path) for entry in entries if entry.name.startswith(".")]
+    for stray in strays:
+        if stray.name.endswith(".tmp"):
+            stray.unlink()
+        elif stray.name.endswith(".parts"):
+            shutil.rmtree(stray)

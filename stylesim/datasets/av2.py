@@ -9,7 +9,9 @@ into train, val and test keeps drives apart and is taken over where the folders 
 
 from __future__ import annotations
 
+import os
 from collections.abc import Iterator
+from itertools import chain
 from pathlib import Path
 
 import numpy as np
@@ -55,15 +57,16 @@ def scenes(path: str | Path) -> Iterator[Scene]:
         yield _scene(folder, folder.parent.name if folder.parent.name in SPLITS else "")
 
 
-def files(path: str | Path) -> list[Path]:
+def files(path: str | Path) -> Iterator[Path]:
     """The scenarios' folders, each of which can be read alone; InputError as for `scenes`."""
     root = Path(path)
     if not root.is_dir():
         raise InputError(f"{root} is no folder; give a scenario's folder, a split, or the root of the data set")
-    found = list(_folders(root))
-    if not found:
+    found = _folders(root)
+    first = next(found, None)
+    if first is None:
         raise InputError(f"{root} holds no Argoverse 2 scenario (a folder with scenario_<id>.parquet)")
-    return found
+    return chain([first], found)
 
 
 def sniff(path: Path) -> bool:
@@ -79,7 +82,9 @@ def _folders(root: Path) -> Iterator[Path]:
         return
     splits = [root / name for name in SPLITS if (root / name).is_dir()]
     for parent in splits or [root]:
-        for folder in sorted(p for p in parent.iterdir() if p.is_dir()):
+        with os.scandir(parent) as entries:
+            names = sorted(entry.name for entry in entries if entry.is_dir())
+        for folder in (parent / name for name in names):
             if _parquet(folder) is None:
                 raise InputError(f"{folder} has no scenario_*.parquet; the copy is incomplete, or it is something else")
             yield folder

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import importlib
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Literal, cast
@@ -41,9 +41,9 @@ class DatasetFormat:
         """The reader's `scenes` function; its module is imported now."""
         return cast("Callable[..., Iterator[Scene]]", importlib.import_module(self.module).scenes)
 
-    def files(self, path: Path) -> list[Path]:
+    def files(self, path: Path) -> Iterable[Path]:
         """The files (or folders) there that can be read alone, in their order; only where `pieces` says so."""
-        return cast("list[Path]", importlib.import_module(self.module).files(path))
+        return cast("Iterable[Path]", importlib.import_module(self.module).files(path))
 
     def sniff(self, path: Path) -> bool:
         """True if that file or folder looks like this format; cheap, never raises."""

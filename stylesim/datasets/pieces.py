@@ -11,10 +11,11 @@ import os
 import signal
 import threading
 from collections import deque
-from collections.abc import Callable, Generator, Iterator, Mapping, Sequence
+from collections.abc import Callable, Generator, Iterable, Iterator, Mapping
 from concurrent.futures import Future, ProcessPoolExecutor
 from concurrent.futures.process import BrokenProcessPool
-from dataclasses import dataclass
+from dataclasses import dataclass, field
+from itertools import islice
 from multiprocessing.synchronize import Event
 from pathlib import Path
 from typing import Any
@@ -29,6 +30,7 @@ from stylesim.scene import Scene
 
 PIECE_FILES = 32  # chosen: the scenes of a part (CorpusWriter), where a file is a scene; a worker asks rarely for work
 PIECE_PARTS = 10_000  # numbers kept for the parts of a piece; chosen: at 32 scenes each, more than any file holds
+_BETWEEN = "\0"  # no name of a file holds it
 AHEAD = 4  # pieces per worker that are handed out before the oldest is done; chosen: none waits for a slow one
 
 
@@ -43,7 +45,7 @@ class Piece:
     """Files that are read together, and everything a process needs to do it."""
 
     number: int
-    files: tuple[Path, ...]
+    packed: str  # names of its files, seen from the root, joined by NUL: a data set has millions, and this is small
     root: Path
     format: str
     options: Mapping[str, Any]
@@ -54,25 +56,36 @@ class Piece:
         """The file that says that the piece is whole."""
         return self.partial / "records" / "pieces" / f"{self.number:07d}.json"
 
+    @property
     def names(self) -> list[str]:
         """Its files, as seen from the root of the data set."""
-        return [os.path.relpath(file, self.root) for file in self.files]
+        return self.packed.split(_BETWEEN)
+
+    @property
+    def files(self) -> list[Path]:
+        """Its files."""
+        return [self.root / name for name in self.names]
 
 
 @dataclass(frozen=True)
 class Done:
-    """What a finished piece gave."""
+    """What finished pieces gave."""
 
-    scenes: int
-    steps: int
-    counts: Mapping[str, int]
+    scenes: int = 0
+    steps: int = 0
+    counts: Mapping[str, int] = field(default_factory=dict)
+
+    def __add__(self, other: Done) -> Done:
+        """What both gave together."""
+        return Done(self.scenes + other.scenes, self.steps + other.steps, added(dict(self.counts), other.counts))
 
 
-def pieces(files: Sequence[Path], *, single: bool, **about: Any) -> list[Piece]:
+def pieces(files: Iterable[Path], *, root: Path, single: bool, **about: Any) -> list[Piece]:
     """The files in their order, PIECE_FILES to a piece, or one where a file holds many scenes."""
     size = 1 if single else PIECE_FILES
-    groups = [tuple(files[i : i + size]) for i in range(0, len(files), size)]
-    return [Piece(number=number, files=group, **about) for number, group in enumerate(groups)]
+    names = (os.path.relpath(file, root) for file in files)
+    groups = iter(lambda: _BETWEEN.join(islice(names, size)), "")
+    return [Piece(number=number, packed=group, root=root, **about) for number, group in enumerate(groups)]
 
 
 def finished(piece: Piece) -> Done | None:
@@ -81,7 +94,7 @@ def finished(piece: Piece) -> Done | None:
         kept = json.loads(piece.marker.read_bytes())
     except FileNotFoundError:
         return None
-    if kept["files"] != piece.names():
+    if kept["files"] != piece.names:
         raise InputError(f"{piece.partial} was begun when {piece.root} held other files; remove it and start anew")
     return Done(kept["scenes"], kept["steps"], kept["counts"])
 
@@ -103,7 +116,7 @@ def read_piece(piece: Piece, seen: Callable[[], None]) -> Done:
         seen()
     if pending:
         write_part(piece.partial, part, pending)
-    kept = {"scenes": scenes, "steps": steps, "counts": counts, "files": piece.names()}
+    kept = {"scenes": scenes, "steps": steps, "counts": counts, "files": piece.names}
     write_whole(piece.marker, json_bytes(kept))
     return Done(scenes, steps, counts)
 
@@ -114,7 +127,7 @@ def _scenes(piece: Piece) -> Iterator[Scene]:
         yield from read(file, **piece.options)
 
 
-def in_processes(waiting: Sequence[Piece], *, workers: int) -> Generator[Done]:
+def in_processes(waiting: Iterable[Piece], *, workers: int) -> Generator[Done]:
     """Read the pieces in processes of their own, results in their order; the first error in that order is raised.
 
     On an error, or when the caller stops, the others give up at their next scene. WorkerError if one was killed.

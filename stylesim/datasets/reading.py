@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 from stylesim.datasets.accounting import added, checked
 from stylesim.datasets.format import DatasetFormat
 from stylesim.datasets.formats import AUTO, dataset_format, recognised
-from stylesim.datasets.pieces import Piece, finished, in_processes, pieces, read_piece
+from stylesim.datasets.pieces import Done, Piece, finished, in_processes, pieces, read_piece
 from stylesim.errors import InputError, unknown
 
 if TYPE_CHECKING:
@@ -51,22 +51,23 @@ def read(
     if not source.exists():
         raise InputError(f"{source} does not exist; {format} is to be had from {chosen.where}")
     configuration = {"format": format, "options": dict(sorted(options.items())), "licence": chosen.licence}
-    files = chosen.files(source) if chosen.pieces else []
+    files = chosen.files(source) if chosen.pieces else ()
     total: dict[str, int] = {}
     steps = 0
     with CorpusWriter(out, source=format, configuration=configuration, resume=resume) as writer:
         if chosen.pieces:
-            about = {"root": source, "format": format, "options": options, "partial": writer.partial}
-            work = pieces(files, single=chosen.pieces == "large files", **about)
-            total, steps = _read_pieces(work, workers=workers, progress=progress or _quiet)
+            about = {"format": format, "options": options, "partial": writer.partial}
+            work = pieces(files, root=source, single=chosen.pieces == "large files", **about)
+            done = _read_pieces(work, workers=workers, progress=progress or _quiet)
+            total, steps = dict(done.counts), done.steps
         else:
             workers = 1
-            for done, scene in enumerate(chosen.scenes()(source, **options), start=1):
+            for number, scene in enumerate(chosen.scenes()(source, **options), start=1):
                 writer.add(scene)
                 total = added(total, scene.counts)
                 steps += int(scene.tracks.valid.sum())
                 if progress is not None:
-                    progress(done, 0)
+                    progress(number, 0)
         checked(total, steps=steps, where=f"{format} {source.name}")
         if steps == 0:
             raise InputError(f"{source} gave no scene of {format}")
@@ -77,14 +78,16 @@ def _quiet(done: int, total: int) -> None:
     """Tells nobody."""
 
 
-def _read_pieces(
-    work: list[Piece], *, workers: int, progress: Callable[[int, int], None]
-) -> tuple[dict[str, int], int]:
-    """Read what is not finished yet; the sums of counts and agent-frames over all pieces."""
-    found = {piece.number: finished(piece) for piece in work}
-    waiting = [piece for piece in work if found[piece.number] is None]
-    results = [done for done in found.values() if done is not None]
-    seen = sum(done.scenes for done in results)
+def _read_pieces(work: list[Piece], *, workers: int, progress: Callable[[int, int], None]) -> Done:
+    """Read what is not finished yet; the sums over all pieces."""
+    total, waiting = Done(), []
+    for piece in work:
+        before = finished(piece)
+        if before is None:
+            waiting.append(piece)
+        else:
+            total += before
+    seen = total.scenes
 
     def one_more() -> None:
         nonlocal seen
@@ -92,17 +95,14 @@ def _read_pieces(
         progress(seen, 0)
 
     if workers == 1:
-        results += [read_piece(piece, one_more) for piece in waiting]
-    else:
-        with closing(in_processes(waiting, workers=workers)) as answers:
-            for done in answers:
-                results.append(done)
-                seen += done.scenes
-                progress(seen, 0)
-    total: dict[str, int] = {}
-    for done in results:
-        total = added(total, done.counts)
-    return total, sum(done.steps for done in results)
+        for piece in waiting:
+            total += read_piece(piece, one_more)
+        return total
+    with closing(in_processes(waiting, workers=workers)) as answers:
+        for done in answers:
+            total += done
+            progress(total.scenes, 0)
+    return total
 
 
 def _checked_options(chosen: DatasetFormat, options: dict[str, Any]) -> dict[str, Any]:

@@ -1,5 +1,7 @@
 from __future__ import annotations
 
+import gzip
+import json
 from dataclasses import replace
 
 import numpy as np
@@ -68,8 +70,26 @@ def test_changed_missing_and_added_files_are_found(tmp_path):
     track = path / "tracks" / "part-00000.parquet"
     track.write_bytes(track.read_bytes() + b" ")
     (path / "agents" / "part-00000.parquet").unlink()
-    (path / "roads" / "stray").write_text("")
+    (path / "signals" / "stray").write_text("")
     text = "\n".join(verify(path).errors)
     assert "tracks/part-00000.parquet: sha256 differs" in text
     assert "agents/part-00000.parquet: missing" in text
-    assert "roads/stray: not listed" in text
+    assert "signals/stray: not listed" in text
+
+
+def test_roads_are_held_against_their_names(tmp_path):
+    path = written(tmp_path / "c", make_scene()).path
+    road = next((path / "roads").iterdir())
+    (path / "roads" / "stray").write_text("")
+    assert verify(path).errors == ("roads/stray: no scene names it",)
+    (path / "roads" / "stray").unlink()
+    whole = road.read_bytes()
+    other = json.loads(gzip.decompress(whole)) | {"source": "inferred"}
+    for damaged, said in (
+        (gzip.compress(json.dumps(other).encode()), "not what its name says"),
+        (whole[:-9], "damaged"),
+    ):
+        road.write_bytes(damaged)
+        assert said in "".join(verify(path).errors)
+    road.unlink()
+    assert "missing" in "".join(verify(path).errors)

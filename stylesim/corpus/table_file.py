@@ -1,4 +1,4 @@
-"""`LabelFile`: a label table of any length, written in bounded memory, there under its name only when whole."""
+"""`TableFile`: a table of any length, written in bounded memory, there under its name only when whole."""
 
 from __future__ import annotations
 
@@ -15,15 +15,17 @@ from stylesim.corpus.tables import LEVEL, ROW_GROUP, parquet_bytes
 PART_ROWS = 1 << 16
 
 
-class LabelFile:
+class TableFile:
     """Takes tables with the same columns one by one. Call `finish`, and `discard` in any case.
 
-    Up to PART_ROWS rows are held; more go to part files in a hidden folder beside the file and are joined at the end,
-    one row group at a time. The same rows give the same bytes, however they were cut into tables.
+    Up to PART_ROWS rows (a row group, where that is less) are held; more go to part files in a hidden folder beside
+    the file and are joined at the end, one row group at a time. The same rows give the same bytes, however they were
+    cut into tables.
     """
 
-    def __init__(self, path: Path) -> None:
+    def __init__(self, path: Path, *, row_group: int = ROW_GROUP) -> None:
         self.path = path
+        self._row_group = row_group
         self._parts = path.with_name(f".{path.name}.{os.getpid()}.parts")
         self._count = 0
         self._waiting: list[pl.DataFrame] = []
@@ -33,19 +35,21 @@ class LabelFile:
         """Append a table. CorpusError if the disk is full or the folder cannot be written."""
         self._waiting.append(table)
         self._rows += table.height
-        if self._rows >= PART_ROWS:
+        if self._rows >= min(PART_ROWS, self._row_group):
             self._write_part()
 
     def finish(self) -> str:
         """Put the file in its place; returns its sha256. CorpusError as in `add`; an older file stays then."""
         if not self._count:
-            return write_whole(self.path, parquet_bytes(pl.concat(self._waiting, rechunk=True)))
+            return write_whole(
+                self.path, parquet_bytes(pl.concat(self._waiting, rechunk=True), row_group=self._row_group)
+            )
         if self._rows:
             self._write_part()
         whole = self._parts / "whole.parquet"
         try:
             pl.scan_parquet([self._part(number) for number in range(self._count)]).sink_parquet(
-                whole, compression="zstd", compression_level=LEVEL, row_group_size=ROW_GROUP, statistics=False,
+                whole, compression="zstd", compression_level=LEVEL, row_group_size=self._row_group, statistics=False,
                 maintain_order=True,
             )  # fmt: skip
             digest = sha256_of(whole)

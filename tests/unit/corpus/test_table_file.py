@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from stylesim.corpus import label_file, label_store
+from stylesim.corpus import label_store, table_file
 from stylesim.corpus.label_store import read_labels, write_labels
 from stylesim.labels import StyleLabels
 
@@ -48,7 +48,7 @@ def test_the_same_labels_give_the_same_bytes_however_they_come(
 ) -> None:
     whole = labels(1000)
     write_labels(tmp_path / "one", [whole], {}, "f")
-    monkeypatch.setattr(label_file, "PART_ROWS", 150)
+    monkeypatch.setattr(table_file, "PART_ROWS", 150)
     monkeypatch.setattr(label_store, "TABLE_ROWS", 40)
     write_labels(tmp_path / "many", cut(whole, size), {}, "f")
     assert files(tmp_path / "many") == files(tmp_path / "one")
@@ -69,7 +69,7 @@ def test_chunks_of_two_spans_go_to_two_files(tmp_path: Path) -> None:
 def test_a_failure_leaves_the_older_files_and_nothing_else(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, part_rows: int
 ) -> None:
-    monkeypatch.setattr(label_file, "PART_ROWS", part_rows)
+    monkeypatch.setattr(table_file, "PART_ROWS", part_rows)
     monkeypatch.setattr(label_store, "TABLE_ROWS", 5)
     write_labels(tmp_path, [labels(30)], {}, "f")
     before = files(tmp_path)
