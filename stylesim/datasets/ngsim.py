@@ -77,7 +77,7 @@ def _files(path: Path) -> list[Path]:
 def _periods(table: pl.DataFrame) -> Iterator[tuple[str, pl.DataFrame, dict[str, int]]]:
     """The periods of a site in the order of their offsets; the first carries the rows that belong to none."""
     sound = pl.all_horizontal(pl.col("frame_id", "time").is_finite().fill_null(False)) & pl.col("agent").is_not_null()
-    sound &= pl.col("time").abs() < MAX_WALL_MS
+    sound &= (pl.col("time").abs() < MAX_WALL_MS) & (pl.col("frame_id").abs() < MAX_WALL_MS / STEP_MS)
     readable = table.filter(sound)
     offset = (pl.col("time") - STEP_MS * pl.col("frame_id")).round(0).cast(pl.Int64)
     readable = readable.with_columns(offset=offset)

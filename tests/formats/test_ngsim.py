@@ -103,3 +103,13 @@ def test_the_real_sample(shared_data):
     assert counts["rows_in"] - counts["rows_out"] == counts["rows_dropped_heading_unknown"] == 191
     speeds = np.concatenate([s.tracks.speed_mps[s.tracks.valid] for s in found])
     assert 3.0 < speeds[speeds > 1].mean() < 15.0  # a street with lights, 35 mph
+
+
+def test_a_frame_number_beyond_all_bounds_is_one_unreadable_row(tmp_path):
+    path = tmp_path / "portal.csv"
+    text = ngsim.portal_text([("us-101", 5000, ngsim.cars())])
+    header, first, rest = text.split("\n", 2)
+    fields = first.split(",")
+    fields[header.lower().split(",").index("frame_id")] = "1e308"
+    path.write_text("\n".join([header, ",".join(fields), rest]))
+    assert total(scenes(path))["rows_dropped_unreadable"] == 1
