@@ -61,11 +61,20 @@ def train(
     history: float = typer.Option(5.0, min=0.1, help="Seconds of history that the model sees."),
     future: float = typer.Option(6.0, min=0.1, help="Seconds that it forecasts."),
     stride: float = typer.Option(3.0, min=0.1, help="Seconds from one t0 of a scene to the next."),
+    robust: str = typer.Option(
+        "none",
+        help="For rare drivers, comma-separated: balanced (styles drawn equally often), group_dro, jtt, cvar; "
+        "the first two need labelled tracks.",
+    ),
+    robust_by: str = typer.Option("tdbm", help="Labels that make the groups of --robust: tdbm or kdsc."),
+    augment: Path | None = typer.Option(None, help="A (generated) corpus to learn from as well."),
+    augment_share: float = typer.Option(0.3, min=0.0, max=1.0, help="Share of every batch that --augment gives."),
     seed: int = typer.Option(0, min=0, help="Same seed, same weights (on one kind of machine)."),
     resume: bool = typer.Option(False, help="Go on from an unfinished training of the same request."),
 ) -> None:
     """Train the forecaster, with or without style."""
     from stylesim.corpus import Corpus
+    from stylesim.forecasting.robust import RobustSettings
     from stylesim.forecasting.training import train as run
     from stylesim.windows import WindowSpec
 
@@ -83,6 +92,9 @@ def train(
             patience=patience,
             batch_size=batch_size,
             lr=lr,
+            robust=RobustSettings(RobustSettings.of(robust).methods, by=robust_by),
+            augment=None if augment is None else Corpus(augment),
+            augment_share=augment_share,
             seed=seed,
             out=out,
             resume=resume,

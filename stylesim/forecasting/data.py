@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import warnings
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -29,19 +29,26 @@ class Example:
     inputs: TensorBatch
     style: Tensor  # [batch 3] (z, k, c)
     future_m: Float[Tensor, "batch time 2"]  # frame of the target at t0
+    group: Int64[Tensor, " batch"] | None = None  # what the sample counts for; never an input
 
 
 @dataclass(frozen=True, eq=False)
 class TrainingData:
-    """Compiled samples with their `style_cond`."""
+    """Compiled samples with their `style_cond`.
+
+    `sampling`: weights of the training samples in place of the corpus's. `group`: a number per sample (`groups`).
+    """
 
     store: SampleStore
     style: Int64[np.ndarray, "sample 3"]
     config: InputConfig
+    sampling: Float64[np.ndarray, " train"] | None = None
+    group: Int64[np.ndarray, " sample"] | None = None
+    needed: tuple[str, ...] = ("train", "val")
 
     def __post_init__(self) -> None:
         """Refuse data without training or validation samples."""
-        for number, name in enumerate(("train", "val")):
+        for number, name in enumerate(self.needed):
             if not (self.store.origin[:, 3] == number).any():
                 raise InputError(
                     f"split {name!r} has no agent with a whole history and future: its scenes are too short or "
@@ -62,8 +69,10 @@ class TrainingData:
         """Sampling weight of each training sample.
 
         Samples that the corpus's weights leave out get the mean of the others, and a warning says how many they are.
-        InputError where they leave out all, or are no weights.
+        InputError where they leave out all, or are no weights. `sampling` takes their place.
         """
+        if self.sampling is not None:
+            return self.sampling
         weight = self.store.weight[self.split(0)].astype(np.float64)
         missing = np.isnan(weight)
         advice = "balance the corpus anew (`stylesim balance`), or merge it anew"
@@ -85,13 +94,8 @@ class TrainingData:
         Equal weights: each sample once, in random order. Else: drawn with replacement, by weight, from the training
         split only.
         """
-        rng = stream(seed, epoch, "", "sampler")
         index = self.split(0)
-        weight = self.weight
-        if (weight == weight[0]).all():
-            order = rng.permutation(index)
-        else:
-            order = rng.choice(index, len(index), p=weight / weight.sum())
+        order = drawn(index, self.weight, len(index), stream(seed, epoch, "", "sampler"))
         batches = np.split(order, range(batch_size, len(order), batch_size))
         if len(batches) > 1 and len(batches[-1]) < batch_size:
             batches = batches[:-1]  # a small last batch would weigh its samples more
@@ -105,19 +109,50 @@ class TrainingData:
             TensorBatch.of(batch, device),
             torch.from_numpy(self.style[index]).to(device),
             torch.from_numpy(future).to(device),
+            None if self.group is None else torch.from_numpy(self.group[index]).to(device),
         )
 
     def examples(self, batches: list[Int64[np.ndarray, " batch"]], device: torch.device) -> Iterator[Example]:
         """The batches one after the other."""
         return (self.example(index, device) for index in batches)
 
+    @property
+    def parts(self) -> tuple[TrainingData, ...]:
+        """What the samples are drawn from: this alone."""
+        return (self,)
+
+    def with_parts(self, parts: Sequence[TrainingData]) -> TrainingData:
+        """The same with other sampling weights or groups."""
+        (only,) = parts
+        return only
+
+    @property
+    def drawn_share(self) -> tuple[float, ...]:
+        """How much of the draws comes from each of the parts."""
+        return (1.0,)
+
     def intentions(self, queries: int, *, seed: int) -> Float32[np.ndarray, "band query 2"]:
         """The intentions of the training samples."""
-        index = self.split(0)
-        agent = self.store.sample[index, 1]
-        pose = self.store.agent_pose[agent]
-        velocity = to_target(self.store.agent_state[agent, -1, STATE_VX : STATE_VX + 2], pose[:, 2])
-        end = to_target(self.store.future_m[index, -1] - pose[:, :2], pose[:, 2])
+        velocity, end = self.ends(self.split(0))
         horizon_s = self.config.future_steps * self.config.dt_s
         rng = stream(seed, 0, "", "intentions")
         return intentions(velocity, end, horizon_s=horizon_s, queries=queries, rng=rng)
+
+    def ends(
+        self, index: Int64[np.ndarray, " sample"]
+    ) -> tuple[Float32[np.ndarray, "sample 2"], Float32[np.ndarray, "sample 2"]]:
+        """Velocity at t0 and place at the end of the future of samples, in the frame of each at t0."""
+        agent = self.store.sample[index, 1]
+        pose = self.store.agent_pose[agent]
+        velocity = to_target(self.store.agent_state[agent, -1, STATE_VX : STATE_VX + 2], pose[:, 2])
+        return velocity, to_target(self.store.future_m[index, -1] - pose[:, :2], pose[:, 2])
+
+
+def drawn(
+    index: Int64[np.ndarray, " row"], weight: Float64[np.ndarray, " row"], count: int, rng: np.random.Generator
+) -> Int64[np.ndarray, " draw"]:
+    """`count` of the samples: with equal weights each as often as any other (within one), else by weight."""
+    if (weight == weight[0]).all():
+        rounds = [rng.permutation(index) for _ in range(-(-count // len(index)))]
+        return np.concatenate(rounds)[:count] if rounds else index[:0]
+    return rng.choice(index, count, p=weight / weight.sum())

@@ -13,16 +13,17 @@ import torch
 
 from stylesim.errors import InputError, StylesimError
 from stylesim.forecasting.checkpoint import read_tensors, write_tensors
-from stylesim.forecasting.data import TrainingData
 from stylesim.forecasting.devices import Runtime
+from stylesim.forecasting.mixing import TrainingSet
 from stylesim.forecasting.model import ForecastNetwork
 from stylesim.forecasting.objective import mixture_loss
 from stylesim.forecasting.style_embedding import style_parameter_groups
 from stylesim.forecasting.validation import validated
+from stylesim.forecasting.weighing import Mean, Weigher
 from stylesim.randomness import stream
 
 STATE_FILE = "state.pt"
-FORMAT, VERSION = "stylesim-training", 1
+FORMAT, VERSION = "stylesim-training", 2
 CLIP_NORM = 5.0  # chosen: above what a healthy step has, so that it only catches outliers
 WARM_UP_SHARE = 0.05  # of all steps; chosen as is common
 
@@ -54,8 +55,16 @@ class Loop:
     """One training run in a folder of its own."""
 
     def __init__(
-        self, network: ForecastNetwork, data: TrainingData, settings: TrainSettings, *, runtime: Runtime, folder: Path
+        self,
+        network: ForecastNetwork,
+        data: TrainingSet,
+        settings: TrainSettings,
+        *,
+        runtime: Runtime,
+        folder: Path,
+        weigher: Weigher | None = None,
     ) -> None:
+        self.weigher = weigher or Mean()
         self.data, self.settings, self.runtime, self.folder = data, settings, runtime, folder
         groups = style_parameter_groups(network, lr=settings.lr, weight_decay=settings.weight_decay)
         self.network = network
@@ -100,7 +109,8 @@ class Loop:
         for example in self.data.examples(batches, self.runtime.device):
             self._set_rate()
             modes = self.forward(example.inputs, example.style)
-            loss = mixture_loss(modes, self.network.anchors(example.inputs), example.future_m)
+            each = mixture_loss(modes, self.network.anchors(example.inputs), example.future_m)
+            loss = self.weigher(each, example.group)
             value = float(loss.detach())
             if not math.isfinite(value):
                 raise StylesimError(
@@ -143,6 +153,7 @@ class Loop:
             "optimizer": self.optimizer.state_dict(),
             "curve": self.curve,
             "counters": [self.epoch, self.step, self.best_epoch],
+            "weigher": self.weigher.state(),
         }
         write_tensors(self.folder / STATE_FILE, content)
 
@@ -156,3 +167,4 @@ class Loop:
         self.optimizer.load_state_dict(content["optimizer"])
         self.best, self.curve = content["best"], content["curve"]
         self.epoch, self.step, self.best_epoch = content["counters"]
+        self.weigher.restore(content["weigher"])

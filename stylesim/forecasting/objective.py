@@ -25,17 +25,17 @@ def responsible_query(
 
 def mixture_loss(
     layers: Sequence[Modes], anchor_m: Float[Tensor, "batch query time 2"], future_m: Float[Tensor, "batch time 2"]
-) -> Float[Tensor, ""]:
-    """Mean over decoder layers of: Gaussian negative log-likelihood of the responsible query + its cross-entropy.
+) -> Float[Tensor, " batch"]:
+    """Of each sample: mean over decoder layers of the responsible query's Gaussian -log likelihood + cross-entropy.
 
     In nats; the likelihood is averaged over time steps and coordinates.
     """
     query = responsible_query(anchor_m, future_m)
     row = torch.arange(len(query), device=query.device)
-    total = future_m.new_zeros(())
+    total = future_m.new_zeros(len(query))
     for modes in layers:
         log_sd = modes.log_sd[row, query]
         error = (future_m - modes.mean_m[row, query]) / log_sd.exp()
-        likelihood = (0.5 * error.square() + log_sd).mean()
-        total = total + likelihood + functional.cross_entropy(modes.logit, query)
+        likelihood = (0.5 * error.square() + log_sd).mean(dim=(1, 2))
+        total = total + likelihood + functional.cross_entropy(modes.logit, query, reduction="none")
     return total / len(layers)

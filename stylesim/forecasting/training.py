@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import json
 import shutil
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import asdict, dataclass
+from itertools import chain
 from pathlib import Path
 from typing import Any
 
@@ -13,8 +14,8 @@ import numpy as np
 import torch
 
 from stylesim.corpus import Corpus
-from stylesim.corpus.files import new_folder, write_whole
 from stylesim.errors import InputError, unknown
+from stylesim.forecasting.augmenting import added_view
 from stylesim.forecasting.checkpoint import MODEL_FILE, RECORD_FILE, load, save
 from stylesim.forecasting.conditioner import Judges, StyleConditioner, fit_conditioner
 from stylesim.forecasting.config import CONDITIONS, InputConfig, ModelConfig, model_config
@@ -22,14 +23,19 @@ from stylesim.forecasting.data import TrainingData
 from stylesim.forecasting.devices import runtime
 from stylesim.forecasting.forecaster import TrainedForecaster
 from stylesim.forecasting.loop import STATE_FILE, Loop, TrainSettings
+from stylesim.forecasting.mixing import MixedData, TrainingSet
 from stylesim.forecasting.model import ForecastNetwork
+from stylesim.forecasting.reweighting import group_report, identified, loss_weigher, with_groups
+from stylesim.forecasting.robust import RobustSettings
 from stylesim.forecasting.samples import SPLITS, Progress, compiled, windows
 from stylesim.forecasting.store import SampleStore
+from stylesim.forecasting.training_folder import check_same, opened, write_json
 from stylesim.randomness import stream
 from stylesim.resources import cache_dir
 from stylesim.windows import WindowSpec
 
 NULL_STYLE = -1
+FIRST_FOLDER = "identification"  # of the first model that JTT trains
 
 
 def train(
@@ -48,6 +54,9 @@ def train(
     lr: float = 1e-3,
     patience: int = 8,
     judges: Judges | None = None,
+    robust: str | Sequence[str] | RobustSettings = (),
+    augment: Corpus | None = None,
+    augment_share: float = 0.3,
     cache: Path | None = None,
     accelerator: str = "auto",
     resume: bool = False,
@@ -63,6 +72,10 @@ def train(
     last finished epoch. `out` holds model.pt and training.json (settings, loss curve). InputError for a corpus
     without those splits, unknown names, or an `out` that exists.
 
+    `robust` says what to do for rare drivers: names as "balanced,jtt", or `RobustSettings`. `augment` is a corpus,
+    usually generated, from which the share `augment_share` of every batch is taken at equal gradient steps
+    (`augmenting.added_view` says which of its scenes).
+
     `stage` is called with what begins (compiling, fitting, judging, training); `progress` then counts for it.
     """
     if condition not in CONDITIONS:
@@ -72,6 +85,8 @@ def train(
     )
     inputs = InputConfig.of(spec, _time_step(corpus))
     config = model_config(size, inputs, fusion=fusion, reading=reading)
+    robust = RobustSettings.of(robust)
+    added = None if augment is None else added_view(corpus, augment, augment_share)
     out = Path(out)
     record = {
         "corpus": corpus.fingerprint,
@@ -81,35 +96,64 @@ def train(
         "settings": asdict(settings),
         "fusion": fusion,
         "reading": reading,
+        "robust": json.loads(json.dumps(asdict(robust))),
+        "augment": None if added is None else added.to_dict(),
     }
     if resume and (out / MODEL_FILE).exists():
-        _same(record, out)
+        check_same(record, out)
         return load(out)
-    folder = _opened(out, record, resume=resume)
+    folder = opened(out, record, resume=resume)
     watch = _Watch(stage, progress)
-    store = compiled(corpus, spec, inputs, cache or cache_dir(), progress=watch.begin("compiling samples"))
-    conditioner, data = _styled(corpus, condition, spec, store, inputs, judges, seed, watch)
+    corpora = [corpus] if added is None else [corpus, added.corpus]
+    stores = [
+        compiled(c, spec, inputs, cache or cache_dir(), progress=watch.begin("compiling samples")) for c in corpora
+    ]
+    conditioner, parts = _styled(corpora, condition, spec, stores, inputs, judges, seed, watch)
+    data: TrainingSet = parts[0] if added is None else MixedData(parts[0], parts[1], added.share)
     config = _with_styles(config, conditioner)
+    groups: tuple[str, ...] = ()
+    if robust.grouped:
+        data, groups = with_groups(data, corpora, robust)
     place = runtime(accelerator)
+    if "jtt" in robust.methods:
+        first, told = _network(config, data, seed), watch.begin("identifying what is hard")
+        data = identified(data, first, settings, robust, runtime=place, folder=folder / FIRST_FOLDER, progress=told)
+    weigher = loss_weigher(robust, data, groups)
+    loop = Loop(_network(config, data, seed), data, settings, runtime=place, folder=folder, weigher=weigher)
+    loop.restore()
+    loop.run(watch.begin("training"))
+    name = size if condition == "none" else f"{size}-{condition}-{fusion}"
+    forecaster = TrainedForecaster(name, loop.network, conditioner)
+    save(forecaster, folder / MODEL_FILE)
+    write_json(folder / RECORD_FILE, {**record, **_outcome(loop), "groups": group_report(data, groups, weigher)})
+    _close(folder, out)
+    forecaster.training_curve = tuple(loop.curve)
+    return forecaster
+
+
+def _network(config: ModelConfig, data: TrainingSet, seed: int) -> ForecastNetwork:
+    """An untrained network with the intentions of the training samples."""
     with torch.random.fork_rng():
         torch.manual_seed(int(stream(seed, 0, "", "weights").integers(2**62)))
         network = ForecastNetwork(config)
     network.intention_mps2.copy_(torch.from_numpy(data.intentions(config.queries, seed=seed)))
-    loop = Loop(network, data, settings, runtime=place, folder=folder)
-    loop.restore()
-    loop.run(watch.begin("training"))
-    name = size if condition == "none" else f"{size}-{condition}-{fusion}"
-    forecaster = TrainedForecaster(name, network, conditioner)
-    save(forecaster, folder / MODEL_FILE)
-    parameters = sum(p.numel() for p in network.parameters())
-    counts = {split: len(data.split(number)) for number, split in enumerate(SPLITS)}
-    counts["train_without_weight"] = data.without_weight
-    whole = {**record, "samples": counts, "parameters": parameters, "best_epoch": loop.best_epoch, "curve": loop.curve}
-    _write_json(folder / RECORD_FILE, whole)
-    forecaster.training_curve = tuple(loop.curve)
+    return network
+
+
+def _outcome(loop: Loop) -> dict[str, Any]:
+    """What a training left behind, for the record."""
+    counts = {split: len(loop.data.split(number)) for number, split in enumerate(SPLITS)}
+    counts["train_without_weight"] = loop.data.without_weight
+    counts["train_added"] = sum(len(part.split(0)) for part in loop.data.parts[1:])
+    parameters = sum(p.numel() for p in loop.network.parameters())
+    return {"samples": counts, "parameters": parameters, "best_epoch": loop.best_epoch, "curve": loop.curve}
+
+
+def _close(folder: Path, out: Path) -> None:
+    """Leave nothing but the model and its record, under the final name."""
     (folder / STATE_FILE).unlink(missing_ok=True)
+    shutil.rmtree(folder / FIRST_FOLDER, ignore_errors=True)
     folder.rename(out)
-    return forecaster
 
 
 @dataclass(frozen=True)
@@ -137,25 +181,35 @@ def _time_step(corpus: Corpus) -> float:
 
 
 def _styled(
-    corpus: Corpus,
+    corpora: Sequence[Corpus],
     condition: str,
     spec: WindowSpec,
-    store: SampleStore,
+    stores: Sequence[SampleStore],
     inputs: InputConfig,
     judges: Judges | None,
     seed: int,
     watch: _Watch,
-) -> tuple[StyleConditioner | None, TrainingData]:
-    """The conditioner fitted on the training split, and the samples with their style."""
-    if condition == "none":
-        return None, TrainingData(store, np.full((len(store), 3), NULL_STYLE, np.int64), inputs)
-    if judges is None:
-        from stylesim.forecasting.judging import LabelerJudges
+) -> tuple[StyleConditioner | None, list[TrainingData]]:
+    """The conditioner fitted on the training split, and the samples of each corpus with their style.
 
-        judges = LabelerJudges.fit(condition, corpus.split("train"), spec, progress=watch.begin("fitting labellers"))
-    asked = windows(corpus, spec, progress=watch.begin("judging histories"))
-    conditioner, style = fit_conditioner(condition, judges, asked, seed=seed)
-    return conditioner, TrainingData(store, style, inputs)
+    The first corpus alone has validation samples, and labellers are fitted on it alone.
+    """
+    conditioner = None
+    style = np.full((sum(map(len, stores)), 3), NULL_STYLE, np.int64)
+    if condition != "none":
+        if judges is None:
+            from stylesim.forecasting.judging import LabelerJudges
+
+            told = watch.begin("fitting labellers")
+            judges = LabelerJudges.fit(condition, corpora[0].split("train"), spec, progress=told)
+        told = watch.begin("judging histories")
+        asked = chain.from_iterable(windows(corpus, spec, progress=told) for corpus in corpora)
+        conditioner, style = fit_conditioner(condition, judges, asked, seed=seed)
+    needed = SPLITS, SPLITS[:1]
+    cut = np.split(style, np.cumsum([len(store) for store in stores])[:-1])
+    return conditioner, [
+        TrainingData(store, rows, inputs, needed=need) for store, rows, need in zip(stores, cut, needed, strict=False)
+    ]
 
 
 def _with_styles(config: ModelConfig, conditioner: StyleConditioner | None) -> ModelConfig:
@@ -163,32 +217,3 @@ def _with_styles(config: ModelConfig, conditioner: StyleConditioner | None) -> M
         return config
     styles, clusters, contexts = conditioner.cells.filled.shape
     return ModelConfig.from_dict({**config.to_dict(), "styles": styles, "clusters": clusters, "contexts": contexts})
-
-
-def _opened(out: Path, record: dict[str, Any], *, resume: bool) -> Path:
-    """The folder OUT.partial to train in; InputError if `out` exists or what lies there was begun otherwise."""
-    out, partial = new_folder(out)
-    if resume and (partial / RECORD_FILE).exists():
-        _same(record, partial)
-        return partial
-    if any((partial / name).exists() for name in (STATE_FILE, "request.json")):  # epochs, or a corpus's parts
-        raise InputError(f"{partial} is left from an unfinished run; add --resume to go on, or remove it")
-    shutil.rmtree(partial, ignore_errors=True)
-    _write_json(partial / RECORD_FILE, record)
-    return partial
-
-
-def _same(record: dict[str, Any], folder: Path) -> None:
-    """InputError unless the training in `folder` was begun with the same settings."""
-    path = folder / RECORD_FILE
-    try:
-        begun = json.loads(path.read_text(encoding="utf-8"))
-    except (OSError, ValueError) as error:
-        raise InputError(f"{path} cannot be read ({error}); remove {folder} and start anew") from None
-    for key, value in record.items():
-        if begun.get(key) != value:
-            raise InputError(f"{folder} was trained with {key} = {begun.get(key)}, not {value}; resume with the same")
-
-
-def _write_json(path: Path, content: dict[str, Any]) -> None:
-    write_whole(path, json.dumps(content, indent=1, sort_keys=True).encode())

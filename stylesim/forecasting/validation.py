@@ -7,7 +7,8 @@ import torch
 from jaxtyping import Float
 from torch import Tensor
 
-from stylesim.forecasting.data import Example, TrainingData
+from stylesim.forecasting.data import Example
+from stylesim.forecasting.mixing import TrainingSet
 from stylesim.forecasting.model import ForecastNetwork
 from stylesim.forecasting.objective import mixture_loss
 from stylesim.forecasting.selection import selected_modes
@@ -17,7 +18,7 @@ MOST_SAMPLES = 2048  # chosen: a few seconds on two cores; which ones depends on
 BATCH = 256
 
 
-def validated(network: ForecastNetwork, data: TrainingData, *, seed: int, device: torch.device) -> dict[str, float]:
+def validated(network: ForecastNetwork, data: TrainingSet, *, seed: int, device: torch.device) -> dict[str, float]:
     """Means over (at most MOST_SAMPLES) validation samples: val_loss (nats), min_ade_m, min_fde_m, brier_fde_m.
 
     With a style embedding also style_effect_m: how far the best mode's end moves when the style is taken away; a
@@ -37,6 +38,13 @@ def validated(network: ForecastNetwork, data: TrainingData, *, seed: int, device
     return {name: float(value) for name, value in zip(used, mean, strict=False)}
 
 
+def min_fde_m(network: ForecastNetwork, example: Example) -> Float[Tensor, " batch"]:
+    """Of each sample: how far the nearest of the modes ends from where the agent went."""
+    last, config = network(example.inputs, example.style)[-1], network.config
+    path, _ = selected_modes(last.mean_m, last.logit, count=config.modes, apart_m=config.nms_m)
+    return (path[:, :, -1] - example.future_m[:, None, -1]).norm(dim=-1).min(dim=1).values
+
+
 def _measured(network: ForecastNetwork, example: Example) -> Float[Tensor, "batch 5"]:
     layers = network(example.inputs, example.style)
     loss = mixture_loss(layers, network.anchors(example.inputs), example.future_m)
@@ -51,4 +59,4 @@ def _measured(network: ForecastNetwork, example: Example) -> Float[Tensor, "batc
         query = last.logit.argmax(dim=1)
         row = torch.arange(len(query), device=query.device)
         effect = (last.mean_m[row, query, -1] - without.mean_m[row, query, -1]).norm(dim=-1)
-    return torch.stack([loss.expand_as(fde), error.mean(dim=2).min(dim=1).values, fde, brier, effect], dim=1)
+    return torch.stack([loss, error.mean(dim=2).min(dim=1).values, fde, brier, effect], dim=1)

@@ -16,7 +16,9 @@ from stylesim.forecasting.conditioning import Measured, StyleCells
 from stylesim.forecasting.config import InputConfig, model_config
 from stylesim.forecasting.forecaster import TrainedForecaster
 from stylesim.forecasting.model import ForecastNetwork
+from stylesim.labels import UNDETERMINED, LabelFlag, StyleLabels
 from stylesim.scene import Scene
+from stylesim.style import STYLE_CLASSES
 from stylesim.windows import WindowSpec, target_agents
 from tests.conftest import make_scene
 
@@ -72,3 +74,32 @@ def made_corpus(folder: Path, *, scenes: int = 6, n_frames: int = 90, n_agents: 
             scene = make_scene(f"scene-{number}", n_agents=n_agents, n_frames=n_frames, seed=number)
             writer.add(scene, split="train" if number < scenes * 2 // 3 else "val")
         return writer.finish()
+
+
+def with_style_labels(corpus: Corpus, rare: str = "car-0") -> Corpus:
+    """Track labels beside a corpus: the driver named `rare` is aggressive, car-1 unknown, the others are careful."""
+    rows = [(scene.scene_id, agent) for scene in corpus for agent in scene.tracks.agent_id]
+    style = [UNDETERMINED if agent == "car-1" else 0 if agent == rare else 3 for _, agent in rows]
+    n = len(rows)
+    corpus.write_labels(
+        [
+            StyleLabels(
+                method="tdbm",
+                span="track",
+                classes=STYLE_CLASSES,
+                feature_names=("speed",),
+                scene_id=tuple(scene for scene, _ in rows),
+                agent_id=tuple(agent for _, agent in rows),
+                start_frame=np.zeros(n, np.int32),
+                stop_frame=np.full(n, 90, np.int32),
+                score=np.zeros((n, len(STYLE_CLASSES)), np.float32),
+                style=np.array(style, np.int8),
+                margin=np.zeros(n, np.float32),
+                aggressiveness=np.zeros(n, np.float32),
+                feature=np.zeros((n, 1), np.float32),
+                missing=np.zeros((n, 1), bool),
+                flags=np.array([LabelFlag.HIGHWAY if agent == "car-2" else 0 for _, agent in rows], np.int32),
+            )
+        ]
+    )
+    return corpus

@@ -59,4 +59,4 @@ def test_the_loss_is_the_gaussian_likelihood_and_the_cross_entropy() -> None:
     sd = 2.0
     modes = Modes(anchor + 2.0, torch.full_like(anchor, math.log(sd)), logit([0.25, 0.75]))
     expected = 0.5 * (2.0 / sd) ** 2 + math.log(sd) - math.log(0.75)
-    torch.testing.assert_close(mixture_loss([modes, modes], anchor, future), torch.tensor(expected))
+    torch.testing.assert_close(mixture_loss([modes, modes], anchor, future), torch.tensor([expected]))

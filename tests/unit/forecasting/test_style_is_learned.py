@@ -52,7 +52,7 @@ def test_a_style_that_decides_the_future_is_used(fusion: str) -> None:
     before = model.style.u.detach().clone() if model.style is not None else torch.zeros(0)
     model.train()
     for _ in range(220):
-        loss = mixture_loss(model(inputs, style), model.anchors(inputs), future)
+        loss = mixture_loss(model(inputs, style), model.anchors(inputs), future).mean()
         optimizer.zero_grad()
         loss.backward()
         optimizer.step()
