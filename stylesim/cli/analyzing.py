@@ -12,7 +12,11 @@ from stylesim.cli.console import progress_bar, say, show_table
 def analyze(
     corpora: list[Path] = typer.Argument(help="Corpora, simulated or recorded."),
     out: Path = typer.Option(..., "--out", help="New folder for index.html, figures/*.png and tables/*.parquet."),
-    reference: str = typer.Option("real-reference", help="Frozen scaler that judges TDBM."),
+    reference: str = typer.Option(
+        "real-reference",
+        help="What judges TDBM: real-reference, sim-reference (frozen), or within (the corpus' own drivers).",
+    ),
+    by_source: bool = typer.Option(False, help="Show every source of a merged corpus by itself."),
     sensitivity: bool = typer.Option(
         True, help="Also measure drivers with other smoothers, windows and scalers (6 more passes over ≤ 40 scenes)."
     ),
@@ -34,25 +38,26 @@ def analyze(
                 progress.stage(stage, "scenes" if stage.endswith("measure") else "variants")
             progress(done, total)
 
-        found = run(opened, reference=reference, with_sensitivity=sensitivity, seed=seed, progress=tell)
+        found = run(
+            opened, reference=reference, by_source=by_source, with_sensitivity=sensitivity, seed=seed, progress=tell
+        )
     for text in found.about["warnings"]:
         say(f"warning: {text}")
-    rows = [
-        [row["corpus"], row["orientation"], row["class"], row["n_drivers"], _text(row)]
-        for row in found.tables["class_shares"].iter_rows(named=True)
-    ]
-    show_table("TDBM classes", ("corpus", "orientation", "class", "drivers", "share %"), rows)
+    shares = list(found.tables["class_shares"].iter_rows(named=True))
+    classes = list(dict.fromkeys(row["class"] for row in shares))
+    cells: dict[tuple[str, str, int], list[str]] = {}
+    for row in shares:
+        cells.setdefault((row["corpus"], row["orientation"], row["n_drivers"]), []).append(_text(row))
+    rows = [[corpus, orientation, drivers, *texts] for (corpus, orientation, drivers), texts in cells.items()]
+    show_table("Share of each TDBM class (%)", ("corpus", "orientation", "drivers", *classes), rows)
     for name, about in found.about["corpora"].items():
         say(f"{name}: " + ", ".join(f"{n} {what}" for what, n in about["counts"].items()))
     say(f"{save_analysis(found, out)}")
 
 
 def _text(row: dict[str, float | str | None]) -> str:
-    value, low, high = (row[key] for key in ("value", "low", "high"))
-    if not isinstance(value, float) or not isinstance(low, float) or not isinstance(high, float):
-        return str(row["status"])
-    mark = " †" if row["status"] == "within site" else ""
-    return f"{100 * value:.0f} [{100 * low:.0f}, {100 * high:.0f}]{mark}"
+    value = row["value"]
+    return f"{100 * value:.0f}" if isinstance(value, float) else str(row["status"])
 
 
 def add_to(app: typer.Typer) -> None:

@@ -17,6 +17,8 @@ from stylesim.style import STYLE_CLASSES
 
 WIDTH = 8.6
 SOFT = "#6B7680"
+MOST_SIDE_BY_SIDE = 4  # chosen: corpora whose intervals can still be told apart in one figure
+LABELLED_SHARE = 8.0  # %; chosen: a narrower piece has no room for its number
 TITLES = {"printed": "printed orientation, s = B·x", "transposed": "transposed, s = Bᵀ·x"}
 
 
@@ -37,8 +39,13 @@ def _whisker(axes: Axes, row: dict[str, Any], y: float, number: int, *, scale: f
 
 
 def shares_figure(table: Frame) -> Figure:
-    """Share of each class per corpus with its 95 % interval, both orientations side by side."""
+    """Share of each class per corpus, both orientations side by side.
+
+    Up to MOST_SIDE_BY_SIDE corpora have a bar per class with its 95 % interval; more of them one stacked bar each.
+    """
     corpora = _corpora(table)
+    if len(corpora) > MOST_SIDE_BY_SIDE:
+        return _stacked(table)
     with drawing():
         figure, panels = new_figure(WIDTH, 1.5 + 0.17 * len(NAMES) * max(2, len(corpora)), columns=2)
         step = 0.8 / len(corpora)
@@ -61,6 +68,38 @@ def shares_figure(table: Frame) -> Figure:
             axes.set_xlabel("share of drivers (%)")
             axes.set_title(TITLES[orientation])
         figure.legend(*panels[0].get_legend_handles_labels(), loc="outside lower center", ncols=min(4, len(corpora)))
+    return figure
+
+
+def _stacked(table: Frame) -> Figure:
+    """One bar per corpus, cut into its classes; corpora that are too small say so."""
+    corpora = _corpora(table)
+    with drawing():
+        figure, panels = new_figure(WIDTH, 1.3 + 0.32 * len(corpora), columns=2)
+        for axes, orientation in zip(panels, ORIENTATIONS, strict=True):
+            for y, corpus in enumerate(corpora):
+                left = 0.0
+                for row in where(table, corpus=corpus, orientation=orientation).iter_rows(named=True):
+                    if row["value"] is None:
+                        axes.annotate("too few", (1, y), va="center", size=7.5, color=SOFT)
+                        break
+                    share = 100 * row["value"]
+                    axes.barh(y, share, left=left, height=0.72, color=style_colour(row["class"]), ec="white", lw=0.6)
+                    if share >= LABELLED_SHARE:
+                        axes.text(
+                            left + share / 2, y, f"{share:.0f}", ha="center", va="center", size=7.5, color="white"
+                        )
+                    left += share
+            names = [f"{c}, n = {where(table, corpus=c)['n_drivers'][0]}" for c in corpora]
+            axes.set_yticks(range(len(corpora)), names if axes is panels[0] else [""] * len(corpora))
+            axes.set_ylim(len(corpora) - 0.5, -0.5)
+            axes.set_xlim(0, 100)
+            axes.grid(visible=False)
+            axes.set_xlabel("share of drivers (%)")
+            axes.set_title(TITLES[orientation])
+        for name in NAMES:
+            panels[0].barh(0, 0, color=style_colour(name), label=name)
+        figure.legend(*panels[0].get_legend_handles_labels(), loc="outside lower center", ncols=len(NAMES))
     return figure
 
 
@@ -105,7 +144,7 @@ def stability_figure(table: Frame) -> Figure | None:
         return None
     figures = list(dict.fromkeys(shown["figure"].to_list()))
     lengths = sorted(set(shown["window_s"].to_list()))
-    corpora = _corpora(table)
+    corpora = _corpora(shown)
     with drawing():
         figure, panels = new_figure(WIDTH, 1.5 + 0.16 * len(figures) * len(corpora), columns=len(lengths))
         for axes, length in zip(panels, lengths, strict=True):

@@ -11,12 +11,13 @@ from matplotlib.figure import Figure
 from stylesim.corpus.files import write_whole
 from stylesim.errors import InputError
 from stylesim.evaluation.analysis.analyze import Analysis
+from stylesim.evaluation.analysis.judge import WITHIN as WITHIN_CORPUS
+from stylesim.evaluation.analysis.tables import known, where
 from stylesim.report import analysis_figures as figures
 from stylesim.report import analysis_tables as tables
-from stylesim.report.analysis_tracks import examples_figure, speeds_figure
+from stylesim.report.analysis_tracks import examples_figure, speeds_figures
 from stylesim.report.blocks import Block, Section, picture
 from stylesim.report.html import render
-from stylesim.report.tables import facts_table
 from stylesim.report.theme import figure_bytes, plural
 
 WITHIN = "Hollow points with dotted bars (†): fewer than 3 units, the interval speaks of this site and time alone."
@@ -25,6 +26,7 @@ CIRCULAR = (
     "figures): a small p says little here. It also takes drivers as independent. δ is Cliff's: the share of pairs in "
     "which the first class has more, minus the share in which it has less; its interval resamples units, then drivers."
 )
+SAID_SHARE = 0.05  # chosen: below it, who is undetermined is left to the table
 Draw = Callable[[str, Figure | None, str], list[Block]]
 
 
@@ -64,7 +66,9 @@ def check_out(folder: Path) -> None:
 
 def _lead(found: Analysis) -> str:
     corpora = ", ".join(f"{n} ({plural(a['units'], 'unit')})" for n, a in found.about["corpora"].items())
-    return f"{corpora}. TDBM judged by {found.about['reference']}; stylesim {found.about['stylesim']}."
+    judge = found.about["reference"]
+    scale = "a scale of the other half of each corpus' drivers" if judge == WITHIN_CORPUS else judge
+    return f"{corpora}. TDBM judged by {scale}; stylesim {found.about['stylesim']}."
 
 
 def _warnings(found: Analysis) -> list[str]:
@@ -72,22 +76,34 @@ def _warnings(found: Analysis) -> list[str]:
 
 
 def _findings(found: Analysis, names: list[str]) -> list[str]:
+    """The two most frequent classes of each corpus; who cannot be judged is said first."""
     listed = []
     shares = found.tables["class_shares"]
     for name in names:
-        own = [row for row in shares.iter_rows(named=True) if row["corpus"] == name and row["orientation"] == "printed"]
-        known = sorted((row for row in own if row["value"] is not None), key=lambda row: -row["value"])[:2]
-        if known:
-            most = " and ".join(f"{row['class']} ({100 * row['value']:.0f} %)" for row in known)
-            listed.append(f"{name}: most frequent in the printed orientation are {most}.")
+        own = where(shares, corpus=name, orientation="printed")
+        share = {row["class"]: row["value"] for row in known(own, "value").iter_rows(named=True)}
+        blank = share.pop("undetermined", 0.0)
+        if not share:
+            listed.append(f"{name}: {own['n_drivers'][0]} drivers are too few for shares.")
+        elif blank == 1.0:
+            listed.append(
+                f"{name}: TDBM judges nobody here (no lanes, or no scale: see below how firm the classes are)."
+            )
         else:
-            listed.append(f"{name}: {own[0]['n_drivers']} drivers are too few for shares.")
+            first, second = sorted(share, key=lambda style: -share[style])[:2]
+            unjudged = f" ({100 * blank:.0f} % cannot be judged)" if blank >= SAID_SHARE else ""
+            both = f"{first} ({100 * share[first]:.0f} %) and {second} ({100 * share[second]:.0f} %)"
+            listed.append(f"{name}: mostly {both} in the printed orientation{unjudged}.")
     return listed
 
 
 def _classes(found: Analysis, draw: Draw) -> Section:
     caption = f"Share of each TDBM class among the drivers, 95 % intervals. {WITHIN}"
     blocks = draw("class_shares", figures.shares_figure(found.tables["class_shares"]), caption)
+    for orientation, title in figures.TITLES.items():
+        table = tables.shares_table(found.tables["class_shares"], orientation, title)
+        if table.rows:
+            blocks.append(Block(table=table))
     blocks.append(Block(table=tables.firmness_table(found.tables["firmness"])))
     text = (
         "The matrix as printed reaches all six classes; its transpose reproduces what the paper reports (only "
@@ -98,6 +114,7 @@ def _classes(found: Analysis, draw: Draw) -> Section:
 
 def _kinematics(found: Analysis, draw: Draw) -> Section:
     blocks: list[Block] = []
+    undrawn: list[str] = []
     for number, name in enumerate(found.about["corpora"]):
         caption = (
             "Median, quartiles, whiskers at the 5th and 95th percentile; classes as printed. * in TDBM's own features."
@@ -105,11 +122,14 @@ def _kinematics(found: Analysis, draw: Draw) -> Section:
         figure = figures.boxes_figure(found.tables["boxes"], name)
         blocks += draw(f"kinematics_{number + 1}", figure, caption)
         if figure is None:
-            blocks.append(Block(heading=f"{name}: no class has 30 drivers with plausible motion; no boxes."))
+            undrawn.append(name)
+    texts = [CIRCULAR]
+    if undrawn:
+        texts.append(f"No boxes of {', '.join(undrawn)}: no class has 30 drivers with plausible motion.")
     blocks.append(Block(table=tables.halves_table(found.tables["split_halves"])))
     if "pair_tests" in found.tables:
         blocks.append(Block(table=tables.pairs_table(found.tables["pair_tests"]), fold=True))
-    return Section("kinematics", "Kinematics by class", (CIRCULAR,), tuple(blocks))
+    return Section("kinematics", "Kinematics by class", tuple(texts), tuple(blocks))
 
 
 def _stability(found: Analysis, draw: Draw) -> Section:
@@ -127,7 +147,9 @@ def _stability(found: Analysis, draw: Draw) -> Section:
 def _clusters(found: Analysis, draw: Draw) -> Section:
     corpora = list(found.about["corpora"])
     caption = "Mean speed of KDSC's clusters, fitted on the training part of each corpus; lines are medians."
-    blocks = draw("kdsc_speed", speeds_figure(found.tables["drivers"], corpora), caption)
+    blocks: list[Block] = []
+    for number, figure in enumerate(speeds_figures(found.tables["drivers"], corpora)):
+        blocks += draw(f"kdsc_speed_{number + 1}", figure, caption)
     blocks.append(Block(table=tables.speed_table(found.tables["kdsc_speed"])))
     blocks.append(Block(table=tables.kdsc_tdbm_table(found.tables["kdsc_tdbm"])))
     for number, name in enumerate(corpora):
@@ -172,9 +194,6 @@ def _sensitivity(found: Analysis) -> Section:
 
 
 def _about(found: Analysis) -> Section:
-    blocks = [
-        Block(table=facts_table(f"{name}: who was counted", about["counts"]))
-        for name, about in found.about["corpora"].items()
-    ]
+    blocks = [Block(table=tables.counts_table(found.about["corpora"]))]
     blocks.append(Block(caption="About", raw=json.dumps(found.about, indent=1, sort_keys=True)))
     return Section("about", "What was analysed", (), tuple(blocks))

@@ -10,25 +10,31 @@ from matplotlib.patches import Polygon
 
 from stylesim.evaluation.analysis.clusters import CLUSTERS
 from stylesim.evaluation.analysis.examples import Example
-from stylesim.evaluation.analysis.parts import TRAIN, held_out_of
+from stylesim.evaluation.analysis.parts import SEVERAL, TRAIN, held_out_of
 from stylesim.evaluation.analysis.tables import Frame, known, where
 from stylesim.evaluation.intervals import MIN_DRIVERS
 from stylesim.report.theme import drawing, style_colour
 
 WIDTH = 8.6
+MOST_COLUMNS = 3  # chosen: narrower panels have no room for their legends
 SPEED_BINS = 24  # chosen: about 1 m/s wide in towns
 COLOUR = {"aggressive": "#E69F00", "normal": "#0072B2"}  # orange and blue, as in the paper's figure
 
 
-def speeds_figure(drivers: Frame, corpora: Sequence[str]) -> Figure | None:
+def speeds_figures(drivers: Frame, corpora: Sequence[str]) -> list[Figure]:
     """Densities of mean speed per cluster: training above, held out below, one column per corpus.
 
-    A cluster of fewer than 30 drivers is not drawn. None where no corpus has clusters.
+    A cluster of fewer than 30 drivers is not drawn, nor a corpus without any such cluster; MOST_COLUMNS to a figure.
     """
     named = known(drivers, "kdsc")
-    shown = [c for c in corpora if (named["corpus"] == c).any()]
-    if not shown:
-        return None
+    sizes = named.group_by("corpus", "part", "kdsc").len()
+    sizes = sizes.filter((sizes["len"] >= MIN_DRIVERS) & (sizes["part"] != SEVERAL))
+    large = set(sizes["corpus"].to_list())
+    shown = [c for c in corpora if c in large]
+    return [_speeds(named, shown[i : i + MOST_COLUMNS]) for i in range(0, len(shown), MOST_COLUMNS)]
+
+
+def _speeds(named: Frame, shown: Sequence[str]) -> Figure:
     with drawing():
         figure = Figure(figsize=(min(WIDTH, 2.9 * max(2, len(shown))), 4.2), layout="constrained")
         grid = figure.subplots(2, len(shown), squeeze=False, sharex="col")
@@ -49,7 +55,8 @@ def speeds_figure(drivers: Frame, corpora: Sequence[str]) -> Figure | None:
                 axes.set_title(f"{corpus}, {part}", fontsize=8.5)
                 axes.set_yticks([])
                 axes.set_xlim(0, edges[-1])
-                axes.legend(fontsize=7.5)
+                axes.margins(y=0.35)  # room for the legend above the bars
+                axes.legend(fontsize=7, loc="upper right")
             grid[1, column].set_xlabel("mean speed (m/s)")
     return figure
 

@@ -5,7 +5,8 @@ from __future__ import annotations
 import polars as pl
 
 from stylesim.corpus import Corpus
-from stylesim.evaluation.analysis.measure import DRIVER, Measured
+from stylesim.evaluation.analysis.judge import DRIVER
+from stylesim.evaluation.analysis.measure import Measured
 from stylesim.evaluation.analysis.shares import NAMES
 from stylesim.labelers.mdsi import MDSI
 from stylesim.labelers.mdsi_key import STYLES

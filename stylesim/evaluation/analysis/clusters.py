@@ -9,7 +9,8 @@ import numpy as np
 import polars as pl
 from jaxtyping import Bool, Float64
 
-from stylesim.evaluation.analysis.measure import DRIVER, Measured
+from stylesim.evaluation.analysis.judge import DRIVER
+from stylesim.evaluation.analysis.measure import Measured
 from stylesim.evaluation.analysis.parts import TRAIN, held_out_of
 from stylesim.evaluation.analysis.shares import NAMES
 from stylesim.evaluation.analysis.statistics import cliffs_delta, resampled

@@ -60,7 +60,7 @@ def _example(scene: Scene, name: str, cluster: str, tdbm: str, agent_id: str) ->
     place = tracks.position_m[agent, frames].astype(np.float64)
     low, high = place.min(axis=0) - AROUND_M, place.max(axis=0) + AROUND_M
     lanes = [] if scene.road is None else [np.asarray(lane.centre_line_m, np.float64) for lane in scene.road.lanes]
-    near = tuple(line for line in lanes if ((line >= low) & (line <= high)).all(axis=1).any())
+    near = tuple(line for line in lanes if _passes(line, low, high))
     return Example(
         corpus=name,
         cluster=cluster,
@@ -74,3 +74,11 @@ def _example(scene: Scene, name: str, cluster: str, tdbm: str, agent_id: str) ->
         size_m=(float(tracks.size_m[agent, 0]), float(tracks.size_m[agent, 1])),
         lanes_m=near,
     )
+
+
+def _passes(
+    line: Float64[np.ndarray, "point 2"], low: Float64[np.ndarray, " 2"], high: Float64[np.ndarray, " 2"]
+) -> bool:
+    """True where a piece of the line may cross the box: a straight lane has points at its two ends only."""
+    first, second = np.minimum(line[:-1], line[1:]), np.maximum(line[:-1], line[1:])
+    return bool(((second >= low) & (first <= high)).all(axis=1).any())

@@ -9,11 +9,11 @@ import numpy as np
 import polars as pl
 from jaxtyping import Float64
 
-from stylesim.evaluation.analysis.measure import DRIVER, SHORT_WINDOW_S, Measured, per_driver, with_tdbm
+from stylesim.evaluation.analysis.judge import DRIVER, with_tdbm
+from stylesim.evaluation.analysis.measure import SHORT_WINDOW_S, Measured, per_driver
 from stylesim.evaluation.analysis.statistics import between_groups_p, cliffs_delta, holm, resampled
 from stylesim.evaluation.intervals import MIN_DRIVERS
 from stylesim.labelers.features import FEATURES
-from stylesim.labelers.tdbm import TDBM
 from stylesim.style import STYLE_CLASSES
 
 # title, unit, and what of the quantity is in TDBM's own features (REFERENCE section 8: testing it is then circular).
@@ -90,7 +90,7 @@ def pair_tests(one: Measured, *, seed: int) -> pl.DataFrame:
     return pl.DataFrame([row | {"p_holm": p} for row, p in zip(rows, adjusted, strict=True)], infer_schema_length=None)
 
 
-def halves(one: Measured, judge: TDBM) -> pl.DataFrame:
+def halves(one: Measured) -> pl.DataFrame:
     """Drivers with two windows of 5 s or more: the class from the first half, the kinematics (`later_`) of the second.
 
     An odd window in the middle belongs to neither.
@@ -103,21 +103,21 @@ def halves(one: Measured, judge: TDBM) -> pl.DataFrame:
     numbered = numbered.filter(pl.col("of") >= 2)
     first = numbered.filter(pl.col("number") < pl.col("of") // 2)
     later = numbered.filter(pl.col("number") >= pl.col("of") - pl.col("of") // 2)
-    early = with_tdbm(per_driver(first), judge, "history", SHORT_WINDOW_S).filter(pl.col("tdbm") != "undetermined")
+    early = with_tdbm(per_driver(first), one.judge, "history", SHORT_WINDOW_S).filter(pl.col("tdbm") != "undetermined")
     means = later.with_columns(pl.col(list(FEATURES)).fill_nan(None)).group_by(keys).agg(
         *[pl.col(name).mean().alias(f"later_{name}") for name in QUANTITIES]
     )  # fmt: skip
     return early.join(means, on=keys, how="inner", maintain_order="left").drop_nulls([f"later_{q}" for q in QUANTITIES])
 
 
-def split_halves(one: Measured, judge: TDBM, *, seed: int) -> pl.DataFrame:
+def split_halves(one: Measured, *, seed: int) -> pl.DataFrame:
     """The judged test (REFERENCE section 8): does the class of the first half say something of the second?
 
     Classes of fewer than 30 drivers are left out and counted. p by permutation of the classes within a scene, Holm
     over the quantities. Scenes in which all drivers have one class cannot speak. `delta` is the boldest against the
     calmest class that is left.
     """
-    both = halves(one, judge)
+    both = halves(one)
     sizes = dict(both["tdbm"].value_counts().iter_rows())
     styles = [s for s in STYLE_CLASSES if sizes.get(s, 0) >= MIN_DRIVERS]
     kept = both.filter(pl.col("tdbm").is_in(styles))

@@ -10,26 +10,19 @@ import polars as pl
 
 from stylesim.corpus import Corpus
 from stylesim.corpus.corpus import SceneInfo
+from stylesim.evaluation.analysis.judge import DRIVER, FLAGS, Judge, fit_within, with_tdbm
+from stylesim.evaluation.analysis.parts import SEVERAL
 from stylesim.labelers.features import FEATURES, tiled_features
 from stylesim.labelers.options import FeatureOptions
 from stylesim.labelers.rows import DriverRows
 from stylesim.labelers.single_windows import track_and_window_rows
 from stylesim.labelers.tdbm import TDBM
-from stylesim.labels import UNDETERMINED, LabelFlag
+from stylesim.labels import LabelFlag
 from stylesim.scene import Scene
 
 # The shorter windows of split halves and stability: the history that the shipped scalers know and of which an 11 s
 # track (Argoverse 2) has two. Chosen.
 SHORT_WINDOW_S = 5.0
-DRIVER = ("unit_id", "agent_id")
-FLAGS = {
-    "no_leader": LabelFlag.NO_LEADER,
-    "no_neighbours": LabelFlag.NO_NEIGHBOURS,
-    "no_lane": LabelFlag.NO_LANE,
-    "short": LabelFlag.SHORT,
-    "highway": LabelFlag.HIGHWAY,
-    "implausible": LabelFlag.IMPLAUSIBLE,
-}
 
 
 @dataclass(frozen=True, eq=False)
@@ -45,30 +38,36 @@ class Measured:
     windows: pl.DataFrame
     counts: dict[str, int]
     parts: str  # what the parts are: "official", "by unit" or "within recording"
+    judge: Judge
 
 
 def measured(
     corpus: Corpus,
     name: str,
-    judge: TDBM,
+    frozen: TDBM,
     *,
+    within: bool = False,
     part_of: Callable[[SceneInfo], str],
     parts: str,
     progress: Callable[[int, int], None] | None = None,
 ) -> Measured:
-    """One pass over the corpus. Parked vehicles, by the labellers' own rule, are counted and left out."""
+    """One pass over the corpus. Parked vehicles, by the labellers' own rule, are counted and left out.
+
+    `frozen` gives the options of the features; it judges too, unless `within`: then the corpus' other half does.
+    """
+    options = frozen.options
     tracks: list[pl.DataFrame] = []
     windows: list[pl.DataFrame] = []
     info = {one.scene_id: one for one in corpus.info}
     for done, scene in enumerate(corpus, start=1):
         part = part_of(info[scene.scene_id])
-        for frames, found in zip((tracks, windows), _scene_frames(scene, judge.options), strict=True):
+        for frames, found in zip((tracks, windows), _scene_frames(scene, options), strict=True):
             frames.append(found.with_columns(pl.lit(part).alias("part")))
         if progress is not None:
             progress(done, len(corpus))
     drivers = per_driver(pl.concat(tracks)) if tracks else per_driver(_frame(_no_rows(), ""))
     every = pl.concat(windows) if windows else _windows_frame(_frame(_no_rows(), ""), 0.0)
-    parked = pl.col("v_avg") <= judge.options.parked_within_m / judge.options.window_s
+    parked = pl.col("v_avg") <= options.parked_within_m / options.window_s
     unknown = pl.col("v_avg").is_null() | pl.col("v_avg").is_nan()
     driving = drivers.filter(~parked & ~unknown)
     counts = {
@@ -78,16 +77,17 @@ def measured(
         "drivers": driving.height,
         "without a full window of 11 s": driving["short"].sum(),
         "implausible (left out of kinematics)": driving["implausible"].sum(),
-        "in more than one part": driving.filter(pl.col("part") == "several").height,
+        "in more than one part": driving.filter(pl.col("part") == SEVERAL).height,
     }
-    driving = with_tdbm(driving, judge, "track", judge.options.window_s)
     every = every.join(driving.select(*DRIVER), on=list(DRIVER), how="semi", maintain_order="left")
-    judged = [with_tdbm(every.filter(pl.col("length_s") == s), judge, span, s) for s, span in _lengths(judge).items()]
-    return Measured(name, driving, pl.concat(judged), {k: int(v) for k, v in counts.items()}, parts)
-
-
-def _lengths(judge: TDBM) -> dict[float, str]:
-    return {judge.options.window_s: "track", SHORT_WINDOW_S: "history"}
+    judge: Judge = frozen
+    if within:
+        short = per_driver(every.filter(pl.col("length_s") == SHORT_WINDOW_S))
+        judge = fit_within({("track", options.window_s): driving, ("history", SHORT_WINDOW_S): short}, options)
+    lengths = {options.window_s: "track", SHORT_WINDOW_S: "history"}
+    judged = [with_tdbm(every.filter(pl.col("length_s") == s), judge, span, s) for s, span in lengths.items()]
+    driving = with_tdbm(driving, judge, "track", options.window_s)
+    return Measured(name, driving, pl.concat(judged), {k: int(v) for k, v in counts.items()}, parts, judge)
 
 
 def _scene_frames(scene: Scene, options: FeatureOptions) -> tuple[pl.DataFrame, pl.DataFrame]:
@@ -153,7 +153,7 @@ def per_driver(tracks: pl.DataFrame) -> pl.DataFrame:
         .agg(
             pl.col("scene_id").first(),
             pl.len().alias("tracks"),
-            pl.when(pl.col("part").n_unique() == 1).then(pl.col("part").first()).otherwise(pl.lit("several"))
+            pl.when(pl.col("part").n_unique() == 1).then(pl.col("part").first()).otherwise(pl.lit(SEVERAL))
             .first().alias("part"),
             *[gap.alias(f) if f == "s_front" else pl.col(f).mean() for f in FEATURES],
             *[pl.col(f).all() for f in ("no_leader", "no_neighbours", "no_lane", "short")],
@@ -161,30 +161,3 @@ def per_driver(tracks: pl.DataFrame) -> pl.DataFrame:
             pl.col("implausible").any(),
         )
     )  # fmt: skip
-
-
-def rows_of(frame: pl.DataFrame, span: str, length_s: float) -> DriverRows:
-    """The rows of a frame, for a labeller."""
-    flags = np.zeros(frame.height, np.int32)
-    for key, flag in FLAGS.items():
-        flags |= np.where(frame[key].to_numpy(), np.int32(flag), np.int32(0))
-    value = np.stack([frame[f].cast(pl.Float64).fill_null(np.nan).to_numpy() for f in FEATURES], axis=1)
-    zero = np.zeros(frame.height, np.int32)
-    scene, agent = tuple(frame["scene_id"].to_list()), tuple(frame["agent_id"].to_list())
-    return DriverRows(span, length_s, scene, agent, zero, zero, value.reshape(-1, len(FEATURES)), flags)
-
-
-def with_tdbm(frame: pl.DataFrame, judge: TDBM, span: str, length_s: float) -> pl.DataFrame:
-    """With the classes of both orientations, the margin and the measured a (null where undetermined)."""
-    found = judge.judge(rows_of(frame, span, length_s))
-    names = np.array([*found.classes, "undetermined"], dtype=object)
-    assert found.style_transposed is not None
-    return frame.with_columns(
-        pl.Series("tdbm", list(names[found.style]), dtype=pl.String),  # UNDETERMINED is -1, the last
-        pl.Series("tdbm_transposed", list(names[found.style_transposed]), dtype=pl.String),
-        pl.Series("margin", np.where(found.style == UNDETERMINED, np.nan, found.margin), dtype=pl.Float64).fill_nan(
-            None
-        ),
-        pl.Series("aggressiveness", found.aggressiveness, dtype=pl.Float64).fill_nan(None),
-        pl.Series("clamped", (found.flags & int(LabelFlag.CLAMPED)) != 0, dtype=pl.Boolean),
-    )

@@ -10,6 +10,7 @@ from stylesim.corpus.corpus import SceneInfo
 from stylesim.evaluation.intervals import MIN_UNITS
 
 TRAIN, HELD_OUT = "train", "held out"
+SEVERAL = "several"  # of a driver who is in more than one part
 TRAIN_SHARE = 0.7  # chosen: a held-out part large enough to be described
 
 

@@ -11,7 +11,8 @@ import polars as pl
 
 from stylesim.corpus import Corpus
 from stylesim.errors import InputError
-from stylesim.evaluation.analysis.measure import DRIVER, _frame, per_driver, with_tdbm
+from stylesim.evaluation.analysis.judge import DRIVER, JUDGED, Judge, with_tdbm
+from stylesim.evaluation.analysis.measure import _frame, per_driver
 from stylesim.evaluation.analysis.statistics import kappa
 from stylesim.evaluation.intervals import MIN_DRIVERS
 from stylesim.kinematics import Smoother
@@ -34,7 +35,7 @@ VALUES = ("same_class", "kappa", "a_change", "largest_shift")
 def sensitivity(
     corpus: Corpus,
     name: str,
-    judge: TDBM,
+    judge: Judge,
     others: dict[str, TDBM],
     *,
     progress: Callable[[int, int], None] | None = None,
@@ -53,7 +54,7 @@ def sensitivity(
         scalers["scaler of this corpus"] = TDBM(options=judge.options, history_s=()).fit(part)
     except InputError:
         refused.append("scaler of this corpus")
-    rows = [_compared(base, with_tdbm(base.drop("tdbm", "tdbm_transposed", "margin", "aggressiveness", "clamped"),
+    rows = [_compared(base, with_tdbm(base.drop(*JUDGED),
                                       other, "track", judge.options.window_s)) | {"variant": variant}
             for variant, other in scalers.items()]  # fmt: skip
     for done, (variant, change) in enumerate(MEASURES.items(), start=1):

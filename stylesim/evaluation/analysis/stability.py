@@ -7,7 +7,8 @@ import polars as pl
 from jaxtyping import Float64
 
 from stylesim.evaluation.agreement import quadratic_kappa
-from stylesim.evaluation.analysis.measure import DRIVER, Measured
+from stylesim.evaluation.analysis.judge import DRIVER
+from stylesim.evaluation.analysis.measure import Measured
 from stylesim.evaluation.analysis.statistics import icc1, kappa, resampled
 from stylesim.style import STYLE_CLASSES
 

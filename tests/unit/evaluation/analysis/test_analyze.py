@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import polars as pl
 import pytest
@@ -9,6 +11,9 @@ import pytest
 from stylesim.corpus import CorpusWriter
 from stylesim.errors import InputError
 from stylesim.evaluation.analysis.analyze import analyze
+from stylesim.evaluation.analysis.judge import JUDGED, fit_within, half_of, with_tdbm
+from stylesim.labelers.features import TDBM_FEATURES
+from stylesim.labelers.options import FeatureOptions
 from stylesim.questionnaire import answer_key
 from stylesim.road import Lane, Road
 from stylesim.scene import Scene
@@ -122,3 +127,58 @@ def test_the_folder(found, tmp_path):
     assert len(list((tmp_path / "out" / "figures").glob("*.png"))) >= 6
     with pytest.raises(InputError, match="not an empty folder"):
         save_analysis(found, tmp_path / "out")
+
+
+def test_within_nobody_is_on_his_own_scale(corpus, found):
+    """Each half judged by the other half's percentiles: as a labeller that was fitted on exactly those drivers."""
+    own = analyze([corpus], reference="within", with_sensitivity=False)
+    drivers = own.tables["drivers"]
+    half = half_of(drivers)
+    fitted = fit_within({("track", 11.0): drivers}, FeatureOptions()).labelers
+    for judged, labeler in enumerate(fitted):
+        others = drivers.filter(half != judged)
+        speed = labeler.track_scaler_.low[0][TDBM_FEATURES.index("v_avg")]
+        assert speed == pytest.approx(np.percentile(others["v_avg"].to_numpy(), 5))
+        again = with_tdbm(drivers.filter(half == judged).drop(*JUDGED), labeler, "track", 11.0)
+        assert again["tdbm"].to_list() == drivers.filter(half == judged)["tdbm"].to_list()
+    assert 40 <= (half == 0).sum() <= 140
+    assert own.about["corpora"]["made"]["judged_within"] is True
+
+
+def test_within_needs_drivers(tmp_path):
+    with CorpusWriter(tmp_path / "few", source="made", configuration={}, seed=1) as writer:
+        for number in range(4):
+            writer.add(scene(number))
+        few = writer.finish()
+    found = analyze([few], reference="within", with_sensitivity=False)
+    assert (found.tables["drivers"]["tdbm"] == "undetermined").all()
+    assert "no scale of its own" in " ".join(found.about["warnings"])
+
+
+def test_sources_of_a_merged_corpus_by_themselves(tmp_path):
+    with CorpusWriter(tmp_path / "both", source="merged", configuration={}, seed=1) as writer:
+        for number in range(12):
+            writer.add(replace(scene(number), source="one" if number < 5 else "other"))
+        both = writer.finish()
+    found = analyze([both], reference="sim-reference", by_source=True, with_sensitivity=False)
+    counted = {name: about["counts"]["drivers"] for name, about in found.about["corpora"].items()}
+    assert counted == {"both: one": 15, "both: other": 21}
+
+
+def test_many_corpora_on_one_page(corpus, tmp_path):
+    """More corpora than can stand side by side: one bar each, and the small ones named once."""
+    from stylesim.report.analysis_page import save_analysis
+
+    few = [corpus]
+    for n in range(5):
+        with CorpusWriter(tmp_path / f"few{n}", source="made", configuration={}, seed=n) as writer:
+            writer.add(scene(100 + n))
+            few.append(writer.finish())
+    page = save_analysis(analyze(few, reference="sim-reference", with_sensitivity=False), tmp_path / "out").read_text()
+    assert "Nothing can be said of few0, few1, few2, few3, few4: too few drivers." in page
+    assert page.count("few3: 3 drivers are too few for shares.") == 1
+
+
+def test_unknown_reference(corpus):
+    with pytest.raises(InputError, match="within"):
+        analyze([corpus], reference="withn")
