@@ -27,10 +27,10 @@ class InputConfig:
     ahead_s: float = 1.5  # polylines are the nearest to where the agent will be then; chosen: a quarter of 6 s
 
     @classmethod
-    def of(cls, spec: WindowSpec, dt_s: float) -> InputConfig:
-        """The input of windows of that spec, at that time step."""
+    def of(cls, spec: WindowSpec, dt_s: float, **view: int) -> InputConfig:
+        """The input of windows of that spec, at that time step; `view` as in `VIEWS`."""
         history, future, _ = spec.steps(dt_s)
-        return cls(dt_s=dt_s, history_steps=history, future_steps=future)
+        return cls(dt_s=dt_s, history_steps=history, future_steps=future, **view)
 
 
 @dataclass(frozen=True)
@@ -81,11 +81,17 @@ class ModelConfig:
 
 
 # REFERENCE section 7: width 64, 16 queries, 2 + 2 layers is about 0.5 M; width 128, 32 queries, 3 + 2 about 2 M.
+# `mini` is for tests and for experiments of many short trainings; chosen: a tenth of tiny's cost.
 SIZES: dict[str, dict[str, int]] = {
+    "mini": {"width": 32, "heads": 1, "encoder_layers": 1, "decoder_layers": 2, "queries": 12},
     "tiny": {"width": 64, "heads": 2, "encoder_layers": 2, "decoder_layers": 2, "queries": 16},
     "small": {"width": 128, "heads": 4, "encoder_layers": 3, "decoder_layers": 2, "queries": 32},
     "base": {"width": 256, "heads": 8, "encoder_layers": 6, "decoder_layers": 4, "queries": 64},
 }
+
+
+# How much of the scene a size sees, where that is not what `InputConfig` says.
+VIEWS: dict[str, dict[str, int]] = {"mini": {"agents": 6, "polylines": 16}}
 
 
 def model_config(size: str, inputs: InputConfig, **changes: Any) -> ModelConfig:

@@ -18,7 +18,7 @@ from stylesim.errors import InputError, unknown
 from stylesim.forecasting.augmenting import added_view
 from stylesim.forecasting.checkpoint import MODEL_FILE, RECORD_FILE, load, save
 from stylesim.forecasting.conditioner import Judges, StyleConditioner, fit_conditioner
-from stylesim.forecasting.config import CONDITIONS, InputConfig, ModelConfig, model_config
+from stylesim.forecasting.config import CONDITIONS, VIEWS, InputConfig, ModelConfig, model_config
 from stylesim.forecasting.data import TrainingData
 from stylesim.forecasting.devices import runtime
 from stylesim.forecasting.forecaster import TrainedForecaster
@@ -83,7 +83,7 @@ def train(
     settings = TrainSettings(
         seed=seed, epochs=epochs, max_steps=max_steps, batch_size=batch_size, lr=lr, patience=patience
     )
-    inputs = InputConfig.of(spec, _time_step(corpus))
+    inputs = InputConfig.of(spec, _time_step(corpus), **VIEWS.get(size, {}))
     config = model_config(size, inputs, fusion=fusion, reading=reading)
     robust = RobustSettings.of(robust)
     added = None if augment is None else added_view(corpus, augment, augment_share)
