@@ -1,9 +1,11 @@
 """The decision at the yellow, executed: P(stop), decelerations and red-running of every style beside the sources.
 
     python -m benchmarks.yellow_light [--backend sumo|highway] [--seed 0] [--quick] [--approaches N] [--out FILE.json]
+                                      [--keep FILE.jsonl]
 
 Single drivers come up to a light so that the time to the stop line at the onset of yellow is uniform on 1 to 6 s
-(SUMO: `benchmarks/dilemma`; highway-env: `hw_yellow_light` with the option arrivals: dilemma). Whether one stopped
+(SUMO: `benchmarks/dilemma`; highway-env: `hw_yellow_light` with the option arrivals: dilemma, on ten roads of one lane
+with a green and a red that are just long enough to leave and to come to a stand). Whether one stopped
 (stood before the line) or crossed is read from its track, as are braking and red-running; "drawn" is what it decided
 at the onset. Sources and the neutral curve: docs/REFERENCE.md, section 5.
 Sets: the six styles and neutral at 20 m/s and 4 s of yellow (Rakha et al. 2007), neutral at 13.9 and 16.7 m/s,
@@ -17,7 +19,7 @@ import json
 import time
 from collections import Counter
 from collections.abc import Iterator
-from dataclasses import asdict
+from dataclasses import asdict, fields
 from pathlib import Path
 
 import numpy as np
@@ -44,6 +46,7 @@ WET = (2.44, 3.0)
 TRID = ((5.6, 2.2), (1.6, 5.9))  # TRID 801675: s before the line, m/s2
 TRID_MEAN_MPS2 = 3.27
 PROMET_STOPPED, PROMET_RED = 0.33, 0.07
+PHASE_S = 14.0  # chosen: a timid driver who comes from 6 s away stands by then, and is gone a green later
 MAX_RMSE, TOLERANCE, MAX_P = 0.05, 0.20, 1e-3
 
 
@@ -53,7 +56,8 @@ def dilemma(backend: str) -> Scenario:
         return load_scenario(str(Path(__file__).with_name("dilemma")))
     stream = load_scenario("hw_yellow_light")
     longer = {"duration_s": 400.0, "warm_up_s": 5.0, "options": {**stream.options, "arrivals": "dilemma"}}
-    return changed(stream.model_copy(update=longer), speed_limit_mps=20.0, yellow_s=4.0)
+    fixed = stream.model_copy(update=longer)
+    return changed(fixed, speed_limit_mps=20.0, yellow_s=4.0, green_s=PHASE_S, red_s=PHASE_S)
 
 
 def changed(scenario: Scenario, **values: float) -> Scenario:
@@ -71,11 +75,12 @@ def episodes(backend: Backend, scenario: Scenario, crowd: Population, *, seed: i
     while drivers < n:
         scene = backend.run_episode(scenario, crowd, seed=seed, episode=episode)
         episode, drivers = episode + 1, drivers + scene.tracks.n_agents
-        COUNTS.update({name: scene.counts.get(name, 0) for name in ("stop_impossible", "gave_up_at_red", "collisions")})
+        COUNTS.update({name: scene.counts.get(name, 0) for name in COUNTED})
         yield scene
 
 
 COUNTS: Counter[str] = Counter()
+COUNTED = ("stop_impossible", "stops_not_executed", "gave_up_at_red", "collisions")  # the second is highway-env's
 
 
 def run(
@@ -85,6 +90,32 @@ def run(
     COUNTS.clear()
     found = yellow_approaches(episodes(backend, scenario, crowd, seed=seed, n=n))
     return found.where(found.free), Counter(COUNTS)
+
+
+def kept(file: Path | None, key: dict[str, object]) -> tuple[Approaches, Counter[str]] | None:
+    """The set of that key from a file of earlier runs, where it is in there."""
+    lines = file.read_text().splitlines() if file is not None and file.exists() else []
+    for item in map(json.loads, lines):
+        if item["key"] == key:
+            columns = {name: np.array(values) for name, values in item["columns"].items()}
+            names = {name: tuple(item["names"][name]) for name in ("style", "unit")}
+            return Approaches(**names, **columns, counts=item["left_out"]), Counter(item["counts"])
+    return None
+
+
+def keep(file: Path | None, key: dict[str, object], found: Approaches, counts: Counter[str]) -> None:
+    """Add a set to the file, one line each."""
+    if file is None:
+        return
+    columns = {
+        field.name: getattr(found, field.name).tolist()
+        for field in fields(Approaches)
+        if field.name not in ("style", "unit", "counts")
+    }
+    names = {"style": found.style, "unit": found.unit}
+    with file.open("a") as stream:
+        line = {"key": key, "names": names, "columns": columns, "left_out": found.counts, "counts": counts}
+        stream.write(json.dumps(line) + "\n")
 
 
 def crowd_of(style: str) -> Population:
@@ -114,7 +145,7 @@ def print_set(name: str, found: Approaches, counts: Counter[str]) -> None:
     print(
         f"  {name:12s} n {len(found):6d}  speed {found.speed_mps.mean():4.1f} m/s  drawn and done differ {differs}"
         f" ({differs / max(1, len(found)):.2%}; gave up at red {counts['gave_up_at_red']})"
-        f"  stop not possible, so gone {counts['stop_impossible']}  collisions {counts['collisions']}"
+        f"  stop not possible, so gone {counts['stop_impossible'] + counts['stops_not_executed']}  collisions {counts['collisions']}"
         f"  red {share.value:.4f}  deceleration {stops.mean():.2f} [{np.quantile(stops, 0.15):.1f} / "
         f"{np.quantile(stops, 0.5):.1f} / {np.quantile(stops, 0.85):.1f}]"
     )
@@ -173,6 +204,7 @@ def main() -> None:
     parser.add_argument("--approaches", type=int, default=20_600, help="per style; a few are not free and left out")
     parser.add_argument("--quick", action="store_true", help="a twentieth of the approaches")
     parser.add_argument("--out", type=Path, help="write the figures as JSON, too")
+    parser.add_argument("--keep", type=Path, help="sets that are done are kept there, and not run again")
     chosen = parser.parse_args()
     n = chosen.approaches // 20 if chosen.quick else chosen.approaches
     begun = time.process_time()
@@ -183,10 +215,14 @@ def main() -> None:
 
     def add(name: str, style: str | Population, count: int, where: Scenario = scenario) -> None:
         crowd = crowd_of(style) if isinstance(style, str) else style
-        sets[name], counts = run(backend, where, crowd, seed=chosen.seed, n=count)
+        key: dict[str, object] = {"backend": chosen.backend, "set": name, "seed": chosen.seed, "n": count}
+        earlier = kept(chosen.keep, key)
+        sets[name], counts = earlier or run(backend, where, crowd, seed=chosen.seed, n=count)
+        if earlier is None:
+            keep(chosen.keep, key, sets[name], counts)
         print_set(name, sets[name], counts)
 
-    for style in (*STYLE_CLASSES[::-1], "neutral"):
+    for style in ("neutral", *STYLE_CLASSES[::-1]):
         add(style, style, n)
     some = max(n // 2, min(n, 2000))
     add("neutral 13.9", "neutral", some, changed(scenario, speed_limit_mps=13.889, yellow_s=3.0))

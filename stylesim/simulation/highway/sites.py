@@ -129,27 +129,3 @@ def exit_site(drawn: Mapping[str, float]) -> Site:
         filled_m={("in", "begin"): 1800.0},
         last_entry_s=45.0,
     )
-
-
-def yellow_light_site(drawn: Mapping[str, float]) -> Site:
-    """400 m of two lanes to a signal, 20 m of crossing, 150 m beyond."""
-    limit, line, across, out = drawn["speed_limit_mps"], 400.0, 420.0, 570.0
-    network = RoadNetwork()
-    through = (("west", "iw"), ("iw", "ie"), ("ie", "east"))
-    for edge, span in zip(through, ((0.0, line), (line, across), (across, out)), strict=True):
-        lanes_beside(network, edge, span, lanes=2, limit_mps=limit)
-    return Site(
-        network,
-        (Trip(through),),
-        arrivals_per_s={through[0]: drawn["demand_vph"] / 3600.0},
-        filled_m={through[0]: 250.0},
-        junction_nodes="i",
-        light=Programme(drawn["green_s"], drawn["yellow_s"], drawn["red_s"]),
-    )
-
-
-SITES: dict[str, Callable[[Mapping[str, float]], Site]] = {
-    "merge": merge_site,
-    "exit": exit_site,
-    "yellow_light": yellow_light_site,
-}

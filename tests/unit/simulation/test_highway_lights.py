@@ -15,6 +15,7 @@ from stylesim.scene import Scene
 from stylesim.signals import SignalState
 from stylesim.simulation.driving import stop_probability
 from stylesim.simulation.highway import HighwayBackend
+from stylesim.simulation.highway.light_sites import DILEMMA_ROADS
 from stylesim.simulation.highway.lights import Programme
 from stylesim.style import STYLE_CLASSES
 from stylesim.tracks import TrackFlag
@@ -33,7 +34,7 @@ def fixed(**values: float) -> dict[str, object]:
 
 @cache
 def scene(
-    population: str = "tdbm_spectrum", arrivals: str = "dilemma", episode: int = 0, seconds: float = 180.0
+    population: str = "tdbm_spectrum", arrivals: str = "dilemma", episode: int = 0, seconds: float = 90.0
 ) -> Scene:
     scenario = load_scenario("hw_yellow_light")
     short = scenario.model_copy(
@@ -59,7 +60,7 @@ def test_the_programme_turns_from_green_to_yellow_to_red():
 def test_the_log_of_the_lights_is_on_the_clock_of_the_tracks_and_names_lanes_with_stop_lines():
     found = scene()
     assert found.signals is not None and found.road is not None
-    assert found.signals.state.shape == (2, found.tracks.n_frames)
+    assert found.signals.state.shape == (DILEMMA_ROADS, found.tracks.n_frames)
     assert set(np.unique(found.signals.state)) == {SignalState.GREEN, SignalState.YELLOW, SignalState.RED}
     for (name,) in found.signals.lane_id:
         line = found.road.lane(name).stop_line_m
