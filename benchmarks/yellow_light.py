@@ -141,11 +141,11 @@ def print_set(name: str, found: Approaches, counts: Counter[str]) -> None:
     known = found.decided >= 0
     differs = int((known & ((found.decided == 1) != found.stopped)).sum())
     stops = found.deceleration_mps2[found.stopped]
-    share = ran_red(found)
+    share, impossible = ran_red(found), counts["stop_impossible"] + counts["stops_not_executed"]
     print(
         f"  {name:12s} n {len(found):6d}  speed {found.speed_mps.mean():4.1f} m/s  drawn and done differ {differs}"
         f" ({differs / max(1, len(found)):.2%}; gave up at red {counts['gave_up_at_red']})"
-        f"  stop not possible, so gone {counts['stop_impossible'] + counts['stops_not_executed']}  collisions {counts['collisions']}"
+        f"  stop not possible, so gone {impossible}  collisions {counts['collisions']}"
         f"  red {share.value:.4f}  deceleration {stops.mean():.2f} [{np.quantile(stops, 0.15):.1f} / "
         f"{np.quantile(stops, 0.5):.1f} / {np.quantile(stops, 0.85):.1f}]"
     )

@@ -62,7 +62,7 @@ class OpenTraffic(Traffic):
             return None
         lanes = [index for index in self.road.graph.after if self._enters_junction(index)]
         offset = float(self._crew.stream("signal").uniform(0.0, self._site.light.cycle_s))
-        return Lights(lanes, replace(self._site.light, offset_s=offset), self._crew.driver_stream)
+        return Lights(lanes, replace(self._site.light, offset_s=offset), self._crew.driver_stream, dt_s=self._dt)
 
     def _enters_junction(self, index: LaneIndex) -> bool:
         inner = self.junction_nodes
@@ -114,7 +114,7 @@ class OpenTraffic(Traffic):
         super().start_log()
         if self.lights is not None:
             self.lights.flags.clear()
-            self.lights.not_executed = 0
+            self.lights.not_executed = self.lights.gave_up = 0
 
     def frame(self) -> list[StyledVehicle]:
         """The cars of the next logged frame, and the lights."""
@@ -149,6 +149,7 @@ class OpenTraffic(Traffic):
                 queue.popleft()
         if self.lights is not None:
             self.counts["stops_not_executed"] = self.lights.not_executed
+            self.counts["gave_up_at_red"] = self.lights.gave_up
         self.counts["not_inserted"] = sum(len(queue) for queue in self._waiting.values())
 
     def _place(self, index: LaneIndex, time_to_line_s: float) -> None:

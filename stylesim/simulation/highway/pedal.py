@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 
 from stylesim.simulation.highway.noise import OrnsteinUhlenbeck
@@ -33,16 +35,18 @@ class Pedal:
         self._noise.retune(style.pedal_noise_mps2, style.pedal_noise_time_s, rng)
         self._lag_s = PEDAL_LAG * style.reaction_time_s
 
-    def press(self, wish_mps2: float, speed_mps: float, dt: float, *, ready: bool = False) -> float:
+    def press(self, wish_mps2: float, speed_mps: float, dt: float, *, stop_mps2: float = math.inf) -> float:
         """The pressed acceleration dt seconds later, m/s2; sets `emergency` where the wish needs more than comfort.
 
-        Restlessness alone never brakes harder than comfort. A `ready` foot has reacted already and does not lag.
+        Restlessness alone never brakes harder than comfort. `stop_mps2` is that of a stop which has its response and
+        its bounded jerk in itself (`stopping`): the foot presses no less.
         """
-        self._foot_mps2 += (wish_mps2 - self._foot_mps2) * dt / (dt if ready else max(self._lag_s, dt))
+        self._foot_mps2 += (wish_mps2 - self._foot_mps2) * dt / max(self._lag_s, dt)
         noise = self._noise.step(dt) * min(max(speed_mps, 0.0) / CALM_MPS, 1.0)
         lowest = max(min(-COMFORT_MPS2, self._foot_mps2), -(LAST_MPS2 + EASE_PER_S * max(speed_mps, 0.0)))
         wanted = min(max(self._foot_mps2 + noise, lowest, -TYRES_MPS2), COMFORT_MPS2)
         most = JERK_MPS3 * dt
         self._pressed_mps2 += min(max(wanted - self._pressed_mps2, -most), most)
+        self._pressed_mps2 = min(self._pressed_mps2, max(stop_mps2, -TYRES_MPS2))
         self.emergency = self._pressed_mps2 < -COMFORT_MPS2
         return self._pressed_mps2

@@ -152,7 +152,7 @@ class Stressing:
 
     def _red_runner(self, attempt: Attempt, place: _Place, now_s: float) -> Act | None:
         car = place.car
-        asked = car.waits_for_gap or bool(getattr(car, "is_yielding", False)) or car.stop_ahead_m < math.inf
+        asked = car.waits_for_gap or bool(getattr(car, "is_yielding", False)) or car.stop_mps2 < math.inf
         has_line = self.road.lane(lane_id(place.index)).stop_line_m is not None
         if not asked or not has_line or not RUNS_FROM_M[0] <= place.left_m <= RUNS_FROM_M[1]:
             return None

@@ -10,7 +10,7 @@ import numpy as np
 from highway_env.vehicle.behavior import IDMVehicle
 from highway_env.vehicle.kinematics import Vehicle
 
-from stylesim.simulation.highway.following import LEAST_GAP_M, behind_leader, free_road
+from stylesim.simulation.highway.following import behind_leader, free_road
 from stylesim.simulation.highway.lane_choice import Needs, choose_lane, must_change
 from stylesim.simulation.highway.noise import Wander
 from stylesim.simulation.highway.path import braking_to_yield_mps2, curve_speed_mps
@@ -51,7 +51,7 @@ class StyledVehicle(IDMVehicle):  # type: ignore[misc]
         self.slip_rad = 0.0  # angle between its course and its body
         self.crashed_s = 0.0
         self.waits_for_gap = False  # set by the junction's right of way
-        self.stop_ahead_m = math.inf  # to where it has decided to stop, from its front bumper; set by the lights
+        self.stop_mps2 = math.inf  # how it brakes for a light; set by the lights, infinite where it need not
         self.emergency_braked = False
         self.lateral_mps2 = LATERAL_MPS2  # accepted now
         self.event_mps2 = math.inf  # a stressor: it accelerates no more than that
@@ -127,9 +127,6 @@ class StyledVehicle(IDMVehicle):  # type: ignore[misc]
         end = self._lane_end_m()
         if end < math.inf:
             acceleration = min(acceleration, self._before_standing(end))
-        if self.stop_ahead_m < math.inf and not self.runs:  # with what it takes, evenly
-            needed = self.speed**2 / (2.0 * max(self.stop_ahead_m, LEAST_GAP_M))
-            acceleration = min(acceleration, -min(needed, TYRES_MPS2))
         acceleration = min(acceleration, self.event_mps2)
         self.action = {"steering": self.steering_control(self.target_lane_index), "acceleration": acceleration}
 
@@ -248,7 +245,8 @@ class StyledVehicle(IDMVehicle):  # type: ignore[misc]
         self._was_yielding = yielding
         self._hesitation_s = max(self._hesitation_s - dt, 0.0)
         self._keeping.step(dt, self.speed)
-        pressed = self._pedal.press(self.action["acceleration"], self.speed, dt, ready=self.stop_ahead_m < math.inf)
+        stop_mps2 = math.inf if self.runs else self.stop_mps2
+        pressed = self._pedal.press(self.action["acceleration"], self.speed, dt, stop_mps2=stop_mps2)
         self.emergency_braked |= self._pedal.emergency
         self._wheel_rad = turned_wheel_rad(self._wheel_rad, self.action["steering"], self, dt)
         self.action = {"steering": self._wheel_rad, "acceleration": max(pressed, -self.speed / dt)}

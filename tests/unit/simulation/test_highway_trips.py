@@ -15,8 +15,8 @@ from stylesim.simulation.highway import HighwayBackend
 from stylesim.simulation.highway.graph import LaneGraph
 from stylesim.simulation.highway.lane_choice import lane_needs
 from stylesim.simulation.highway.lanes import road_of
-from stylesim.simulation.highway.open_traffic import OpenTraffic
 from stylesim.simulation.highway.layouts import SITES
+from stylesim.simulation.highway.open_traffic import OpenTraffic
 from stylesim.simulation.highway.spec import options_of
 from stylesim.simulation.highway.traffic import Crew
 
