@@ -2,45 +2,21 @@
 
 from __future__ import annotations
 
-from collections import Counter
-from collections.abc import Callable, Container, Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
-
-import numpy as np
 
 from stylesim.corpus import Corpus, CorpusWriter
 from stylesim.errors import InputError, unknown
 from stylesim.merging.balance import ROW, check_balance, equal_shares, require_labels, style_groups
 from stylesim.merging.carry import carried_kinds, carried_labels
-from stylesim.merging.clock import COMMON_DT_S, on_common_clock
-from stylesim.merging.kin import Kinship, kept_together, kinship, leaks
-from stylesim.merging.noise import NoiseModel, with_noise
-from stylesim.merging.noise_fit import recorded_sources, train_noise
-from stylesim.merging.splits import SplitPlan, plan_splits
+from stylesim.merging.clock import COMMON_DT_S
+from stylesim.merging.noise_fit import recorded_sources
+from stylesim.merging.plan import Plan, keyed, make_plan, planned_scenes
 from stylesim.merging.telltale import NoiseTraces, as_stored, telltale, traces
-from stylesim.merging.time_blocks import Sight, one_block_each
-from stylesim.randomness import stream
-from stylesim.scene import Scene
 from stylesim.windows import WindowSpec
 
-SceneKey = tuple[int, str]
 Progress = Callable[[int, int], None]
-
-
-@dataclass(frozen=True)
-class _Plan:
-    """Everything that is decided before the first scene is written."""
-
-    corpora: tuple[Corpus, ...]
-    splits: SplitPlan
-    new_id: Mapping[SceneKey, str]  # of the scenes that are kept
-    dropped: Mapping[SceneKey, Mapping[str, int]]  # agents taken out of a scene, with their steps
-    kin: Kinship
-    parted: frozenset[SceneKey]  # scenes whose official split would show a driver on both sides
-    noise: tuple[NoiseModel, ...]
-    seed: int
 
 
 def merge(
@@ -76,13 +52,13 @@ def merge(
         raise unknown("noise", str(noise), ("fit",))
     changed = noise is not None or any(abs(i.dt_s - COMMON_DT_S) > 1e-6 for corpus in inputs for i in corpus.info)
     kept, left = _labels_to_carry(inputs, balance, changed=changed, noise=noise)
-    plan = _plan(inputs, split=split, seed=seed, noise=noise, spec=spec or WindowSpec())
+    plan = make_plan(inputs, split=split, seed=seed, noise=noise, spec=spec or WindowSpec())
     weights = _weights(plan, balance)
     said = _said(plan, balance, split, left)
     if plan.noise:
         said["noise_telltale"] = _telltale(plan)
     with CorpusWriter(out, source="merge", configuration=said, seed=seed, resume=resume) as writer:
-        for done, (key, scene) in enumerate(_scenes(plan), start=1):
+        for done, (key, scene) in enumerate(planned_scenes(plan), start=1):
             writer.add(scene, split=plan.splits.split[key])
             if progress is not None:
                 progress(done, len(plan.new_id))
@@ -122,84 +98,13 @@ def _labels_to_carry(
     return kept, left
 
 
-def _plan(
-    inputs: tuple[Corpus, ...],
-    *,
-    split: tuple[float, float, float],
-    seed: int,
-    noise: str | None,
-    spec: WindowSpec,
-) -> _Plan:
-    infos = [(number, info) for number, corpus in enumerate(inputs) for info in corpus.info]
-    everything = {(number, info.scene_id) for number, info in infos}
-    kin = kinship(infos, _keyed(inputs, everything))
-    infos = [(number, info) for number, info in infos if (number, info.scene_id) not in kin.duplicate_of]
-    splits = plan_splits(infos, shares=split, seed=seed, guard_s=spec.history_s + spec.future_s)
-    splits, parted = kept_together(splits, infos, kin)
-    for leak in leaks(infos, splits.split, splits, kin):
-        raise InputError(f"the split would leak: {leak}; merge these corpora apart")
-    dropped = _second_blocks(inputs, splits)
-    often = Counter(info.scene_id for _, info in infos)
-    new_id = {
-        (number, info.scene_id): info.scene_id if often[info.scene_id] == 1 else f"c{number}-{info.scene_id}"
-        for number, info in infos
-        if (number, info.scene_id) in splits.split
-        and len(dropped.get((number, info.scene_id), {})) < max(1, info.n_agents)
-    }
-    models = train_noise(inputs, splits) if noise else ()
-    return _Plan(inputs, splits, new_id, dropped, kin, parted, models, seed)
-
-
-def _second_blocks(inputs: Sequence[Corpus], splits: SplitPlan) -> dict[SceneKey, dict[str, int]]:
-    """The agents to take out of scenes, because they belong to another block of the same recording."""
-    sights = {key: Sight.of(scene) for key, scene in _keyed(inputs, splits.split) if scene.source in splits.within}
-    home = one_block_each((splits.split[key], sight) for key, sight in sights.items())
-    dropped = {}
-    for key, sight in sights.items():
-        block = splits.split[key]
-        strangers = {
-            a: n for a, n in sight.frames.items() if home.get((sight.source, sight.unit_id, a), block) != block
-        }
-        if strangers:
-            dropped[key] = strangers
-    return dropped
-
-
-def _keyed(inputs: Sequence[Corpus], chosen: Container[SceneKey]) -> Iterator[tuple[SceneKey, Scene]]:
-    for number, corpus in enumerate(inputs):
-        for scene in corpus.with_info(i for i in corpus.info if (number, i.scene_id) in chosen):
-            yield (number, scene.scene_id), scene
-
-
-def _scenes(
-    plan: _Plan, *, noise: bool = True, only: Container[SceneKey] | None = None
-) -> Iterator[tuple[SceneKey, Scene]]:
-    """The scenes as they are written; with `noise=False` as they would be without it."""
-    recorded = recorded_sources()
-    for key, scene in _keyed(plan.corpora, plan.new_id if only is None else only):
-        strangers = plan.dropped.get(key, {})
-        if strangers:
-            keep = np.array([agent not in strangers for agent in scene.tracks.agent_id])
-            scene = replace(scene, tracks=scene.tracks.select(keep))
-        scene = on_common_clock(scene)
-        if noise and plan.noise and scene.source not in recorded:
-            number = stream(plan.seed, 0, scene.unit_id, "sensor").integers(len(plan.noise))
-            scene = with_noise(scene, plan.noise[int(number)], seed=plan.seed)
-        yield key, replace(scene, scene_id=plan.new_id[key], twin_of=_renamed(plan, key[0], scene.twin_of))
-
-
-def _renamed(plan: _Plan, number: int, scene_id: str) -> str:
-    """The new id of a scene that another one of the same input is paired with; as it was where that one was dropped."""
-    return plan.new_id.get((number, scene_id), scene_id)
-
-
-def _weights(plan: _Plan, balance: str) -> dict[ROW, float]:
+def _weights(plan: Plan, balance: str) -> dict[ROW, float]:
     if balance == "none":
         return {}
     train = {key for key in plan.new_id if plan.splits.split[key] == "train"}
     group: dict[ROW, str] = {}
     if balance == "source":
-        for key, scene in _keyed(plan.corpora, train):
+        for key, scene in keyed(plan.corpora, train):
             for agent, motor in zip(scene.tracks.agent_id, scene.tracks.is_motor.tolist(), strict=True):
                 if motor and agent not in plan.dropped.get(key, {}):
                     group[plan.new_id[key], agent] = scene.source
@@ -210,7 +115,7 @@ def _weights(plan: _Plan, balance: str) -> dict[ROW, float]:
     return equal_shares(group)
 
 
-def _telltale(plan: _Plan) -> dict[str, Any]:
+def _telltale(plan: Plan) -> dict[str, Any]:
     """How well noise alone tells simulated from recorded training tracks, before and after noise was added."""
     recorded = recorded_sources()
     train = {key for key in plan.new_id if plan.splits.split[key] == "train"}
@@ -218,7 +123,7 @@ def _telltale(plan: _Plan) -> dict[str, Any]:
     for name, added in (("recorded", False), ("before", False), ("after", True)):
         chosen = (
             scene
-            for _, scene in _scenes(plan, noise=added, only=train)
+            for _, scene in planned_scenes(plan, noise=added, only=train)
             if (scene.source in recorded) == (name == "recorded")
         )
         sides[name] = traces(map(as_stored, chosen))
@@ -231,7 +136,7 @@ def _telltale(plan: _Plan) -> dict[str, Any]:
     return result
 
 
-def _said(plan: _Plan, balance: str, split: tuple[float, float, float], left: list[str]) -> dict[str, Any]:
+def _said(plan: Plan, balance: str, split: tuple[float, float, float], left: list[str]) -> dict[str, Any]:
     return {
         "inputs": [corpus.fingerprint for corpus in plan.corpora],
         "balance": balance,
@@ -242,7 +147,7 @@ def _said(plan: _Plan, balance: str, split: tuple[float, float, float], left: li
     }
 
 
-def _counts(plan: _Plan) -> dict[str, int]:
+def _counts(plan: Plan) -> dict[str, int]:
     """Agent-steps in = agent-steps out (before any resampling) + those left out, by reason."""
     infos = [((number, info.scene_id), info) for number, corpus in enumerate(plan.corpora) for info in corpus.info]
     return {
