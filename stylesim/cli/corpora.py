@@ -11,6 +11,7 @@ from stylesim.cli.console import err, progress_bar, say, show_table
 from stylesim.errors import InputError
 
 SHOWN_ERRORS = 20
+WAYS = "tdbm, kdsc, context (highway or not), tdbm+context, kdsc+context or source."
 
 
 def options_of(pairs: list[str]) -> dict[str, str]:
@@ -58,7 +59,10 @@ def read(
 def merge(
     corpus: list[Path] = typer.Argument(help="Corpora to merge (folders)."),
     out: Path = typer.Option(..., "--out", help="Folder of the new corpus; must not exist."),
-    balance: str = typer.Option("none", help="Sampling weights of the training split: none, tdbm or source."),
+    balance: str = typer.Option(
+        "none",
+        help=f"Sampling weights of the training split: none, {WAYS}",
+    ),
     split: str = typer.Option("0.8,0.1,0.1", help="Shares of train, val, test; by recording or episode."),
     noise: str = typer.Option("none", help="none, or fit: make simulated tracks as noisy as the recorded ones."),
     seed: int = typer.Option(0, min=0, help="Same seed, same bytes."),
@@ -111,7 +115,7 @@ def _area(found: dict[str, Any]) -> tuple[str, str]:
 
 def balance(
     corpus: Path = typer.Argument(help="A merged corpus, labelled where --by needs it."),
-    by: str = typer.Option("tdbm", help="What to balance: tdbm or source."),
+    by: str = typer.Option("tdbm", help=f"What to balance: {WAYS}"),
 ) -> None:
     """Write sampling weights for a merged corpus that was labelled after it was made (e.g. after noise)."""
     from stylesim.corpus import Corpus

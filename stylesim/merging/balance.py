@@ -1,4 +1,4 @@
-"""Sampling weights that make styles or sources equally frequent in training, without copying a row."""
+"""Sampling weights that make styles, contexts or sources equally frequent in training, without copying a row."""
 
 from __future__ import annotations
 
@@ -8,13 +8,16 @@ from typing import TypeVar
 
 from stylesim.corpus import Corpus
 from stylesim.errors import InputError, unknown
-from stylesim.labels import StyleLabels
+from stylesim.labelers.context import CONTEXTS
+from stylesim.labels import LabelFlag, StyleLabels
 from stylesim.tracks import Tracks
 
 Key = TypeVar("Key")
 ROW = tuple[str, str]  # (scene_id, agent_id)
 
-BALANCES = ("none", "tdbm", "source")
+CONTEXT = "context"
+# "context": highway or not, as TDBM's labels have it; "tdbm+context": every class has the same share in either.
+BALANCES = ("none", "tdbm", "kdsc", CONTEXT, f"tdbm+{CONTEXT}", f"kdsc+{CONTEXT}", "source")
 # Chosen: one driver in twenty places of an epoch is as much as a rare style may be repeated before the network
 # learns the driver instead of the style.
 MAX_WEIGHT = 20.0
@@ -33,22 +36,42 @@ def equal_shares(group_of: Mapping[Key, str]) -> dict[Key, float]:
     }
 
 
-def style_groups(labels: StyleLabels) -> dict[ROW, str]:
-    """(scene_id, agent_id) -> measured class."""
-    return {(labels.scene_id[i], labels.agent_id[i]): labels.class_name(i) for i in range(len(labels))}
+def method_of(by: str) -> str:
+    """The method whose labels are needed to balance by that."""
+    return "tdbm" if by == CONTEXT else by.removesuffix(f"+{CONTEXT}")
+
+
+def label_groups(labels: StyleLabels, by: str) -> dict[ROW, str]:
+    """(scene_id, agent_id) -> measured class, context, or both, as `by` says.
+
+    A class that nobody could determine stays "undetermined" in any context.
+    """
+    groups = {}
+    for i in range(len(labels)):
+        style = labels.class_name(i)
+        context = CONTEXTS[int((labels.flags[i] & int(LabelFlag.HIGHWAY)) != 0)]
+        both = style if style == UNDETERMINED else f"{style}, {context}"
+        name = context if by == CONTEXT else both if by.endswith(f"+{CONTEXT}") else style
+        groups[labels.scene_id[i], labels.agent_id[i]] = name
+    return groups
 
 
 def balance_weights(corpus: Corpus, by: str) -> dict[ROW, float]:
-    """Weight of each (scene_id, agent_id) of the training split, `by` "tdbm" (or another method) or "source".
+    """Weight of each (scene_id, agent_id) of the training split, `by` one of BALANCES.
 
-    InputError where the corpus has no training split, or lacks the track labels: it names the command to run.
+    InputError for another one, where the corpus has no training split, or where it lacks the track labels: it names
+    the command to run.
     """
+    check_balance(by)
+    if by == "none":
+        return {}
     train = corpus.split("train")
     if by == "source":
         agents = {(scene.scene_id, agent): scene.source for scene in train for agent in _motor(scene.tracks)}
         return equal_shares(agents)
-    require_labels(corpus, by)
-    return equal_shares(style_groups(train.labels(by, "track")))
+    method = method_of(by)
+    require_labels(corpus, method)
+    return equal_shares(label_groups(train.labels(method, "track"), by))
 
 
 def balance(corpus: Corpus, by: str) -> dict[ROW, float]:

@@ -8,7 +8,7 @@ from typing import Any
 
 from stylesim.corpus import Corpus, CorpusWriter
 from stylesim.errors import InputError, unknown
-from stylesim.merging.balance import ROW, check_balance, equal_shares, require_labels, style_groups
+from stylesim.merging.balance import ROW, check_balance, equal_shares, label_groups, method_of, require_labels
 from stylesim.merging.carry import carried_kinds, carried_labels
 from stylesim.merging.clock import COMMON_DT_S
 from stylesim.merging.noise_fit import recorded_sources
@@ -35,9 +35,10 @@ def merge(
 
     One clock of 0.1 s (`clock`). Splits by unit, official ones respected, sources of fewer than three units in
     time blocks with a guard gap of history + future of `spec` (`splits`). `balance`: sampling weights of the
-    training split by measured "tdbm" style or by "source"; nothing is copied. `noise="fit"` makes simulated tracks
-    as noisy as the recorded ones of the training split (`noise`); labels of the inputs do not hold any more then,
-    so label the result and call `balance`. Without it, labels made by one labeller are taken over.
+    training split by measured style, context, both, or source (`balance.BALANCES`); nothing is copied.
+    `noise="fit"` makes simulated tracks as noisy as the recorded ones of the training split (`noise`); labels of the
+    inputs do not hold any more then, so label the result and call `balance`. Without it, labels made by one labeller
+    are taken over.
 
     Scenes that show (nearly) the same driving as an earlier one are left out, and what shows some of it, like a
     counterfactual twin or a replay and its recording, stays on one side of the split (`likeness`, `kin`).
@@ -91,9 +92,10 @@ def _labels_to_carry(
             f"{why} makes the labels of the inputs void: merge with balance none, then `stylesim label` the result and "
             f"`stylesim balance` it by {balance}"
         )
+    method = method_of(balance)
     for corpus in inputs:
-        require_labels(corpus, balance)
-    if (balance, "track") not in kept:
+        require_labels(corpus, method)
+    if (method, "track") not in kept:
         raise InputError(f"cannot balance by {balance}: {'; '.join(left)}; label all inputs with the same labeller")
     return kept, left
 
@@ -110,8 +112,9 @@ def _weights(plan: Plan, balance: str) -> dict[ROW, float]:
                     group[plan.new_id[key], agent] = scene.source
     else:
         wanted = {plan.new_id[key] for key in train}
-        for labels in carried_labels(plan.corpora, balance, "track", new_id=plan.new_id, dropped=plan.dropped):
-            group |= {row: name for row, name in style_groups(labels).items() if row[0] in wanted}
+        method = method_of(balance)
+        for labels in carried_labels(plan.corpora, method, "track", new_id=plan.new_id, dropped=plan.dropped):
+            group |= {row: name for row, name in label_groups(labels, balance).items() if row[0] in wanted}
     return equal_shares(group)
 
 

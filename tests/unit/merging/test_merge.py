@@ -7,7 +7,7 @@ import pytest
 
 from stylesim.corpus import Corpus, CorpusWriter
 from stylesim.errors import InputError
-from stylesim.labels import StyleLabels
+from stylesim.labels import LabelFlag, StyleLabels
 from stylesim.merging.balance import MAX_WEIGHT, balance, balance_weights, equal_shares
 from stylesim.merging.merge import merge
 from tests.conftest import make_scene
@@ -29,7 +29,7 @@ def corpus(out, *, source, units, scenes_per_unit=1, prefix="s", dt_s=0.1, drive
         return writer.finish()
 
 
-def label(target: Corpus, *, scaler="one") -> None:
+def label(target: Corpus, *, scaler="one", highway=lambda row: False) -> None:
     """The first car of each scene is wild, the third is nobody knows what, the others are calm."""
     rows = [(scene.scene_id, agent) for scene in target for agent in scene.tracks.agent_id]
     style = [{0: 0, 2: -1}.get(i, 1) for scene in target for i in range(scene.tracks.n_agents)]
@@ -40,7 +40,8 @@ def label(target: Corpus, *, scaler="one") -> None:
                 method="tdbm", span="track", classes=CLASSES, feature_names=("v",), scene_id=tuple(r[0] for r in rows),
                 agent_id=tuple(r[1] for r in rows), start_frame=np.zeros(n, np.int32), stop_frame=np.full(n, 130),
                 score=np.zeros((n, 2)), style=np.array(style), margin=np.zeros(n), aggressiveness=np.zeros(n),
-                feature=np.arange(n)[:, None] * 1.0, missing=np.zeros((n, 1), bool), flags=np.zeros(n, np.int32),
+                feature=np.arange(n)[:, None] * 1.0, missing=np.zeros((n, 1), bool),
+                flags=np.array([int(LabelFlag.HIGHWAY) * highway(row) for row in range(n)], np.int32),
                 provenance={"scaler": scaler},
             )
         ]
@@ -125,6 +126,25 @@ def test_labels_of_one_labeller_are_carried_and_balanced(tmp_path, two):
             assert weights[key] == 1.0 or labels.class_name(row) != "undetermined"
     assert share["wild"] == pytest.approx(share["calm"])
     assert weights == pytest.approx(balance_weights(merged, "tdbm"))
+
+
+@pytest.mark.parametrize("by", ["context", "tdbm+context"])
+def test_contexts_get_equal_shares(tmp_path, two, by):
+    """Every third driver is on a highway: after balancing, contexts (in every class) weigh the same."""
+    for source in two:
+        label(source, highway=lambda row: row % 3 == 0)
+    merged = merge(two, seed=3, out=tmp_path / "out", balance=by)
+    labels, weights = merged.labels("tdbm", "track"), merged.weights()
+    share: Counter[tuple[str, bool]] = Counter()
+    for row in range(len(labels)):
+        key = (labels.scene_id[row], labels.agent_id[row])
+        style = "any" if by == "context" else labels.class_name(row)
+        share[style, bool(labels.flags[row] & int(LabelFlag.HIGHWAY))] += weights.get(key, 0.0)
+        assert by == "context" or style != "undetermined" or weights.get(key, 1.0) == 1.0
+    determined = {key: total for key, total in share.items() if key[0] != "undetermined"}
+    assert len(determined) == (2 if by == "context" else 4)
+    assert list(determined.values()) == pytest.approx([next(iter(determined.values()))] * len(determined))
+    assert weights == pytest.approx(balance_weights(merged, by))
 
 
 def test_labels_of_other_labellers_are_left_behind_and_said(tmp_path, two):
