@@ -24,7 +24,7 @@ from stylesim.forecasting.model import ForecastNetwork
 
 RECORD_FILE = "training.json"  # settings, corpus and loss curve, for the report
 MODEL_FILE = "model.pt"
-FORMAT, VERSION = "stylesim-forecaster", 1
+FORMAT, VERSION = "stylesim-forecaster", 2  # raise it when the network's weights change meaning
 
 
 def _first_line(error: Exception) -> str:
@@ -39,7 +39,7 @@ def write_tensors(path: Path, content: Mapping[str, Any]) -> None:
 
 
 def read_tensors(path: Path, *, format_name: str, version: int) -> dict[str, Any]:
-    """The content of such a file; InputError if it is missing, damaged, not ours, or newer."""
+    """The content of such a file; InputError if it is missing, damaged, not ours, or of another version."""
     refused = f"{path} is not a checkpoint of stylesim"
     try:
         with warnings.catch_warnings(action="ignore", category=UserWarning):  # of foreign pickles: refused below
@@ -54,7 +54,9 @@ def read_tensors(path: Path, *, format_name: str, version: int) -> dict[str, Any
         raise InputError(f"{refused}: it has no {format_name!r} mark")
     found = content.get("version")
     if not isinstance(found, int) or found > version:
-        raise InputError(f"{path} has version {found}; this stylesim reads up to {version}: install a newer one")
+        raise InputError(f"{path} has version {found}; this stylesim reads version {version}: install a newer one")
+    if found < version:
+        raise InputError(f"{path} has version {found}, of an older network than this one ({version}): train anew")
     return content
 
 

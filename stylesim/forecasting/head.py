@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from typing import cast
 
 import torch
-from jaxtyping import Float
+from jaxtyping import Float, Int
 from torch import Tensor, nn
 from torch.nn import functional
 
@@ -20,11 +20,20 @@ LOG_SD_RANGE = (-3.0, 5.0)  # 5 cm .. 148 m; MTR clips likewise to keep the like
 
 @dataclass(frozen=True, eq=False)
 class Modes:
-    """A mixture over paths in the target's frame."""
+    """A mixture over paths in the target's frame; in training only the paths that learn (one query each)."""
 
-    mean_m: Float[Tensor, "batch query time 2"]
-    log_sd: Float[Tensor, "batch query time 2"]
+    mean_m: Float[Tensor, "batch path time 2"]
+    log_sd: Float[Tensor, "batch path time 2"]
     logit: Float[Tensor, "batch query"]
+
+    def path_of(
+        self, query: Int[Tensor, " batch"]
+    ) -> tuple[Float[Tensor, "batch time 2"], Float[Tensor, "batch time 2"]]:
+        """(mean, log sd) of one query per sample: the only one there is, or the one asked for."""
+        if self.mean_m.shape[1] == 1:
+            return self.mean_m[:, 0], self.log_sd[:, 0]
+        row = torch.arange(len(query), device=query.device)
+        return self.mean_m[row, query], self.log_sd[row, query]
 
 
 class Head(nn.Module):
@@ -41,12 +50,24 @@ class Head(nn.Module):
         self.reach: Tensor
         self.log_sd0: Tensor
 
-    def forward(self, query: Float[Tensor, "batch query width"], anchor: Float[Tensor, "batch query time 2"]) -> Modes:
-        """The mixture; a path is its anchor plus what the network adds, which grows with time from 0."""
+    def forward(
+        self,
+        query: Float[Tensor, "batch query width"],
+        anchor: Float[Tensor, "batch query time 2"],
+        learner: Int[Tensor, " batch"] | None = None,
+    ) -> Modes:
+        """The mixture; a path is its anchor plus what the network adds, which grows with time from 0.
+
+        With `learner`, the path of that query alone.
+        """
+        logit = self.log_odds(query)
+        if learner is not None:
+            row = torch.arange(len(learner), device=learner.device)
+            query, anchor = query[row, learner][:, None], anchor[row, learner][:, None]
         out = self.path(query).unflatten(-1, (self.steps, 4))  # [batch query time 4]
         mean = anchor + self.reach * out[..., :2]
         log_sd = (self.log_sd0 + out[..., 2:]).clamp(*LOG_SD_RANGE)
-        return Modes(mean, log_sd, self.log_odds(query))
+        return Modes(mean, log_sd, logit)
 
     def log_odds(self, query: Float[Tensor, "batch query width"]) -> Float[Tensor, "batch query"]:
         """How likely each query is, before the softmax over them."""

@@ -16,7 +16,7 @@ class Perceptron(nn.Sequential):
 
 
 class Attention(nn.Module):
-    """Multi-head attention of queries to keys; `valid` says which keys exist (at least one per sample must)."""
+    """Multi-head attention of queries to keys and values, which `key_value` makes of tokens (or another layer has)."""
 
     def __init__(self, width: int, heads: int) -> None:
         super().__init__()
@@ -28,21 +28,30 @@ class Attention(nn.Module):
     def forward(
         self,
         query: Float[Tensor, "batch query width"],
-        key: Float[Tensor, "batch key width"],
-        valid: Bool[Tensor, "batch key"] | None,
+        key_value: Float[Tensor, "batch key 2*width"],
+        bias: Float[Tensor, "batch 1 1 key"] | None,
     ) -> Float[Tensor, "batch query width"]:
-        """What each query gathers."""
-        split = (self.heads, -1)
+        """What each query gathers; `bias` is 0 for keys that exist, -inf else (`key_bias`)."""
+        split = (self.heads, query.shape[2] // self.heads)
         q = self.query(query).unflatten(-1, split).transpose(1, 2)  # [batch head query width/head]
-        k, v = self.key_value(key).unflatten(-1, (2, *split)).permute(2, 0, 3, 1, 4)  # each [batch head key width/head]
-        mask = None if valid is None else valid[:, None, None]
-        gathered = functional.scaled_dot_product_attention(q, k, v, attn_mask=mask)
+        both = key_value.reshape(*key_value.shape[:2], 2, *split)  # [batch key 2 head width/head]
+        k, v = both.permute(2, 0, 3, 1, 4)  # each [batch head key width/head]
+        gathered = functional.scaled_dot_product_attention(q, k, v, attn_mask=bias)
         out: Tensor = self.out(gathered.transpose(1, 2).flatten(2))
         return out
 
 
+def key_bias(valid: Bool[Tensor, "batch key"]) -> Float[Tensor, "batch 1 1 key"]:
+    """What attention adds: 0 for keys that exist (one per sample must), -inf for those that do not."""
+    return torch.zeros(valid.shape, device=valid.device).masked_fill(~valid, -torch.inf)[:, None, None]
+
+
 class EncoderLayer(nn.Module):
-    """Self-attention over the tokens of a scene, then a perceptron."""
+    """Agents look at each other and at the lanes, then a perceptron. Lanes look at nobody.
+
+    What a lane piece is does not depend on who drives there, and pieces are four fifths of the tokens: with
+    self-attention over all of them a training step takes about twice as long.
+    """
 
     def __init__(self, width: int, heads: int, dropout: float) -> None:
         super().__init__()
@@ -52,12 +61,16 @@ class EncoderLayer(nn.Module):
         self.dropout = nn.Dropout(dropout)
 
     def forward(
-        self, token: Float[Tensor, "batch token width"], valid: Bool[Tensor, "batch token"]
-    ) -> Float[Tensor, "batch token width"]:
-        """The tokens, each knowing of the others."""
-        x = self.norm1(token)
-        token = token + self.dropout(self.attention(x, x, valid))
-        return token + self.dropout(self.mlp(self.norm2(token)))
+        self,
+        agent: Float[Tensor, "batch agent width"],
+        piece: Float[Tensor, "batch piece 2*width"],
+        bias: Float[Tensor, "batch 1 1 token"],
+    ) -> Float[Tensor, "batch agent width"]:
+        """The agents, each knowing of the others and of the lanes, whose keys and values are `piece`."""
+        x = self.norm1(agent)
+        key_value = torch.cat([self.attention.key_value(x), piece], dim=1)
+        agent = agent + self.dropout(self.attention(x, key_value, bias))
+        return agent + self.dropout(self.mlp(self.norm2(agent)))
 
 
 class DecoderLayer(nn.Module):
@@ -73,23 +86,25 @@ class DecoderLayer(nn.Module):
     def forward(
         self,
         query: Float[Tensor, "batch query width"],
-        scene: Float[Tensor, "batch token width"],
-        valid: Bool[Tensor, "batch token"],
+        agent: Float[Tensor, "batch agent width"],
+        piece: Float[Tensor, "batch piece 2*width"],
+        bias: Float[Tensor, "batch 1 1 token"],
     ) -> Float[Tensor, "batch query width"]:
-        """The queries, each knowing of the others and of the scene."""
+        """The queries, each knowing of the others, of the agents, and of the lanes (`piece`: keys and values)."""
         x = self.norm1(query)
-        query = query + self.dropout(self.among(x, x, None))
-        query = query + self.dropout(self.across(self.norm2(query), scene, valid))
+        query = query + self.dropout(self.among(x, self.among.key_value(x), None))
+        key_value = torch.cat([self.across.key_value(agent), piece], dim=1)
+        query = query + self.dropout(self.across(self.norm2(query), key_value, bias))
         return query + self.dropout(self.mlp(self.norm3(query)))
 
 
 class PatchEncoder(nn.Module):
-    """A history of any fixed length as one token: patches of a few steps, a perceptron each, then one over all."""
+    """A history of any fixed length as one token: patches of a few steps, a layer each, then a perceptron over all."""
 
     def __init__(self, *, steps: int, features: int, patch: int, width: int) -> None:
         super().__init__()
         self.patches, self.patch = -(-steps // patch), patch
-        self.of_patch = Perceptron(patch * features, width, width // 2)
+        self.of_patch = nn.Linear(patch * features, width // 2)
         self.of_all = Perceptron(self.patches * (width // 2), width, width)
 
     def forward(self, history: Float[Tensor, "batch agent time feature"]) -> Float[Tensor, "batch agent width"]:

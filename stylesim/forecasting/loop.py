@@ -16,14 +16,14 @@ from stylesim.forecasting.checkpoint import read_tensors, write_tensors
 from stylesim.forecasting.devices import Runtime
 from stylesim.forecasting.mixing import TrainingSet
 from stylesim.forecasting.model import ForecastNetwork
-from stylesim.forecasting.objective import mixture_loss
+from stylesim.forecasting.objective import mixture_loss, responsible_query
 from stylesim.forecasting.style_embedding import style_parameter_groups
 from stylesim.forecasting.validation import validated
 from stylesim.forecasting.weighing import Mean, Weigher
 from stylesim.randomness import stream
 
 STATE_FILE = "state.pt"
-FORMAT, VERSION = "stylesim-training", 2
+FORMAT, VERSION = "stylesim-training", 3
 CLIP_NORM = 5.0  # chosen: above what a healthy step has, so that it only catches outliers
 WARM_UP_SHARE = 0.05  # of all steps; chosen as is common
 
@@ -108,8 +108,9 @@ class Loop:
         batches = self._batches(self.epoch)[: self.total_steps - self.step]
         for example in self.data.examples(batches, self.runtime.device):
             self._set_rate()
-            modes = self.forward(example.inputs, example.style)
-            each = mixture_loss(modes, self.network.anchors(example.inputs), example.future_m)
+            anchor = self.network.anchors(example.inputs)
+            modes = self.forward(example.inputs, example.style, responsible_query(anchor, example.future_m))
+            each = mixture_loss(modes, anchor, example.future_m)
             loss = self.weigher(each, example.group)
             value = float(loss.detach())
             if not math.isfinite(value):

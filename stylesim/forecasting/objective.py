@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-import torch
 from jaxtyping import Float, Int
 from torch import Tensor
 from torch.nn import functional
@@ -31,11 +30,10 @@ def mixture_loss(
     In nats; the likelihood is averaged over time steps and coordinates.
     """
     query = responsible_query(anchor_m, future_m)
-    row = torch.arange(len(query), device=query.device)
     total = future_m.new_zeros(len(query))
     for modes in layers:
-        log_sd = modes.log_sd[row, query]
-        error = (future_m - modes.mean_m[row, query]) / log_sd.exp()
+        mean, log_sd = modes.path_of(query)
+        error = (future_m - mean) / log_sd.exp()
         likelihood = (0.5 * error.square() + log_sd).mean(dim=(1, 2))
         total = total + likelihood + functional.cross_entropy(modes.logit, query, reduction="none")
     return total / len(layers)

@@ -11,6 +11,7 @@ from stylesim.errors import InputError
 from stylesim.forecasting.batching import gather
 from stylesim.forecasting.config import FUSIONS, InputConfig, ModelConfig, model_config
 from stylesim.forecasting.model import ForecastNetwork
+from stylesim.forecasting.objective import mixture_loss
 from stylesim.forecasting.samples import RoadCutter, add_window
 from stylesim.forecasting.selection import selected_modes
 from stylesim.forecasting.store import MemorySink, StoreBuilder
@@ -137,3 +138,34 @@ def test_prediction_gives_what_the_last_mixture_and_a_selection_give(fusion: str
         found = net.predict(inputs, STYLE)
     for one, other in zip(found, expected, strict=True):
         torch.testing.assert_close(one, other, atol=1e-4, rtol=0)
+
+
+def test_the_path_that_learns_gives_the_loss_and_the_gradient_of_all_paths() -> None:
+    model, inputs = network(), inputs_of(make_scene())
+    future = model.anchors(inputs)[torch.arange(4), torch.tensor([0, 3, 5, 7])] + 1.0
+    learner = torch.tensor([0, 3, 5, 7])
+    assert model(inputs, None, learner)[0].mean_m.shape == (4, 1, 30, 2)
+    gradients = []
+    for wanted in (None, learner):
+        model.zero_grad()
+        loss = mixture_loss(model(inputs, None, wanted), model.anchors(inputs), future)
+        loss.mean().backward()  # type: ignore[no-untyped-call]
+        gradients.append((loss.detach(), [p.grad for p in model.parameters()]))
+    torch.testing.assert_close(*gradients)
+
+
+def test_only_what_exists_is_looked_at() -> None:
+    model, inputs = network(), inputs_of(make_scene())
+    gone = inputs.token_valid.clone()
+    gone[:, [3, -1, -2]] = False
+    inputs = replace(inputs, token_valid=gone)
+    missing = ~inputs.token_valid
+    agents = inputs.agent.shape[1]
+    assert missing[:, :agents].any()
+    assert missing[:, agents:].any()
+    agent, piece = inputs.agent.clone(), inputs.piece.clone()
+    agent[missing[:, :agents]] = 9.0
+    piece[missing[:, agents:]] = 9.0
+    with torch.no_grad():
+        whole, changed = (model(i)[-1].mean_m for i in (inputs, replace(inputs, agent=agent, piece=piece)))
+    torch.testing.assert_close(whole, changed)

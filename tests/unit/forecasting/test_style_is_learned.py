@@ -51,7 +51,7 @@ def test_a_style_that_decides_the_future_is_used(fusion: str) -> None:
     optimizer = torch.optim.Adam(style_parameter_groups(model, lr=3e-3, weight_decay=0.0))
     before = model.style.u.detach().clone() if model.style is not None else torch.zeros(0)
     model.train()
-    for _ in range(220):
+    for _ in range(300):
         loss = mixture_loss(model(inputs, style), model.anchors(inputs), future).mean()
         optimizer.zero_grad()
         loss.backward()

@@ -156,6 +156,7 @@ def test_checkpoints_that_are_not_ours_are_refused(
         "code": {**content, "extra": Evil()},
         "other": {"weight": torch.zeros(3)},
         "newer": {**content, "version": 99},
+        "older": {**content, "version": 1},
         "lacking": {**content, "state": {}},
         "odd": {**content, "config": '{"width": 64}'},
         "tensor": torch.zeros(3),
