@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from typing import Protocol, runtime_checkable
 
@@ -26,6 +26,7 @@ class ForecastTask:
     agent_index: Int[np.ndarray, " driver"]
     future_steps: int
     t0_frame: int  # frame number of t0 in the scene that this was cut from
+    earlier: Scene | None = None  # what was known when the history began, for those who ask for it (`Remembers`)
 
     def __post_init__(self) -> None:
         """Freeze the index."""
@@ -55,8 +56,9 @@ class Forecast:
 class Forecaster(Protocol):
     """Anything that forecasts. One `Forecast` per task, drivers in the order of `task.agent_index`.
 
-    Two things more may be there: `horizon_s`, how far it can look (everybody is then judged up to the shortest one),
-    and `covers(task) -> Bool[driver]`, whom it can speak of (see `Covers`).
+    More may be there: `horizon_s`, how far it can look (everybody is then judged up to the shortest one);
+    `covers(task) -> Bool[driver]`, whom it can speak of (see `Covers`); `earlier_s`, how much of the past before the
+    history it would like (see `Remembers`).
     """
 
     name: str
@@ -75,9 +77,38 @@ class Covers(Protocol):
         ...
 
 
+@runtime_checkable
+class Remembers(Protocol):
+    """A forecaster that uses what the same scene showed before the history: up to `earlier_s` seconds of it."""
+
+    @property
+    def earlier_s(self) -> float:
+        """Seconds wanted; 0 for none."""
+        ...
+
+
+@runtime_checkable
+class Oracle(Protocol):
+    """A forecaster that can be told the truth, for benchmarks; it is only where `sees_future` is True."""
+
+    @property
+    def sees_future(self) -> bool:
+        """True where it must be told."""
+        ...
+
+    def reveal(self, scenes: Iterable[Scene]) -> None:
+        """Take the truth of these scenes, whole ones."""
+        ...
+
+
 def horizon_s(forecaster: Forecaster) -> float:
     """How far the forecaster can look, in seconds; infinity where it does not say."""
     return float(getattr(forecaster, "horizon_s", math.inf))
+
+
+def earlier_s(forecasters: Sequence[object]) -> float:
+    """The longest past before the history that one of the forecasters would like, in seconds."""
+    return max((f.earlier_s for f in forecasters if isinstance(f, Remembers)), default=0.0)
 
 
 def covered(forecasters: Sequence[Forecaster], task: ForecastTask) -> Bool[np.ndarray, " driver"]:

@@ -54,6 +54,13 @@ def anchor_frames(scene: Scene, spec: WindowSpec) -> list[int]:
     return list(range(history - 1, last + 1, stride))
 
 
+def earlier_scene(scene: Scene, t0: int, history_steps: int, earlier_s: float) -> Scene | None:
+    """What was known of a scene when the history began, at most `earlier_s` of it; None where it began then."""
+    last = t0 - history_steps
+    steps = round(earlier_s / scene.tracks.dt_s)
+    return scene.history(last, steps) if last >= 0 and steps > 0 else None
+
+
 def target_agents(scene: Scene, t0: int, spec: WindowSpec, *, need_future: bool = True) -> Int32[np.ndarray, " driver"]:
     """Motor vehicles that are known at t0 and MIN_HISTORY_S before it and (`need_future`) to the end of the future.
 

@@ -19,11 +19,18 @@ if TYPE_CHECKING:
 
 
 class Condition(StrEnum):
-    """What the forecaster is told of a driver's style (always from the history)."""
+    """What the forecaster is told of a driver's style (docs/forecasting.md); from the history, but for the oracle."""
 
     none = "none"
     tdbm = "tdbm"
     kdsc = "kdsc"
+    tdbm_scores = "tdbm_scores"
+    kdsc_probabilities = "kdsc_probabilities"
+    features = "features"
+    random = "random"
+    earlier = "earlier"
+    earlier_features = "earlier_features"
+    oracle = "oracle"
 
 
 class Fusion(StrEnum):
@@ -47,12 +54,19 @@ class Reading(StrEnum):
 def train(
     corpus: Path = typer.Argument(help="A merged corpus (with splits)."),
     out: Path = typer.Option(..., "--out", help="Folder of the new model; must not exist."),
-    condition: Condition = typer.Option(Condition.none, help="Condition on the style of the history."),
+    condition: Condition = typer.Option(
+        Condition.none,
+        help="What it is told of the style, from the history. features and random are control arms; the oracle sees "
+        "the future, for benchmarks only.",
+    ),
     fusion: Fusion = typer.Option(
         Fusion.early, help="Where the style enters the network (without --condition it does not)."
     ),
     size: str = typer.Option("tiny", help="tiny, small or base."),
     reading: Reading = typer.Option(Reading.R1, help="How style, cluster and context make one embedding."),
+    style_dropout: float = typer.Option(
+        0.125, min=0.0, max=0.99, help="Share of samples whose style is hidden in training."
+    ),
     epochs: int = typer.Option(20, min=1, help="At most this many epochs; stops early without progress."),
     max_steps: int | None = typer.Option(None, min=1, help="At most this many batches, whatever the epochs."),
     patience: int = typer.Option(8, min=1, help="Epochs without a better validation minFDE before it stops."),
@@ -86,6 +100,7 @@ def train(
             fusion=fusion.value,
             size=size,
             reading=reading.value,
+            style_dropout=style_dropout,
             spec=WindowSpec(history, future, stride),
             epochs=epochs,
             max_steps=max_steps,
@@ -101,6 +116,8 @@ def train(
             progress=bar,
             stage=lambda what: bar.stage(what, "steps" if what == "training" else "scenes"),
         )
+    if model.sees_future:
+        say(f"{model.name}: it is told what nobody can know at t0; for benchmarks only")
     rows = [
         (r["epoch"], f"{r['train_loss']:.3f}", f"{r['val_loss']:.3f}", f"{r['min_fde_m']:.2f}")
         for r in model.training_curve

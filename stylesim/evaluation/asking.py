@@ -15,10 +15,10 @@ from jaxtyping import Bool, Float32
 from stylesim.corpus import Corpus
 from stylesim.errors import InputError
 from stylesim.evaluation.metrics import METRICS, ForecastErrors, forecast_errors
-from stylesim.forecast import Forecast, Forecaster, ForecastTask, covered
+from stylesim.forecast import Forecast, Forecaster, ForecastTask, Oracle, covered, earlier_s
 from stylesim.scene import Scene
 from stylesim.tracks import AgentKind
-from stylesim.windows import WindowSpec, anchor_frames, target_agents
+from stylesim.windows import WindowSpec, anchor_frames, earlier_scene, target_agents
 
 STANDING_M = 1.0  # issue text: agents that move less than 1 m in the future are reported apart
 
@@ -64,6 +64,7 @@ def questions(
     """
     history, future, _ = spec.steps(scene.tracks.dt_s)
     anchors = anchor_frames(scene, spec)
+    remembered_s = earlier_s(answering)
     counts["scenes"] += 1
     counts["scenes too short for one window"] += not anchors
     for t0 in anchors:
@@ -85,12 +86,18 @@ def questions(
         truth, valid = scene.tracks.position_m[chosen, ahead], scene.tracks.valid[chosen, ahead]
         moved = np.linalg.norm(truth - scene.tracks.position_m[chosen, t0][:, None], axis=2)
         yield Question(
-            task=ForecastTask(past, chosen, future, t0),
+            task=ForecastTask(past, chosen, future, t0, earlier_scene(scene, t0, history, remembered_s)),
             truth_m=truth,
             valid=valid,
             standing=np.where(valid, moved, 0.0).max(axis=1) < STANDING_M,
             identity=tuple(_identity(scene, int(agent), t0) for agent in chosen),
         )
+
+
+def reveal(forecaster: Forecaster, scene: Scene) -> None:
+    """Tell the truth of a scene to a forecaster that is an oracle, and to no other."""
+    if isinstance(forecaster, Oracle) and forecaster.sees_future:
+        forecaster.reveal([scene])
 
 
 def checked_answers(forecaster: Forecaster, tasks: Sequence[ForecastTask]) -> list[Forecast]:
@@ -146,6 +153,7 @@ def ask(
 
     def every() -> Iterator[Question]:
         for done, scene in enumerate(corpus, start=1):
+            reveal(forecaster, scene)
             yield from questions(scene, spec, counts, (forecaster, *beside))
             if progress is not None:
                 progress(done, len(corpus))

@@ -10,12 +10,12 @@ from typing import Any
 import numpy as np
 
 from stylesim.corpus import Corpus
-from stylesim.evaluation.asking import checked_answers
+from stylesim.evaluation.asking import checked_answers, reveal
 from stylesim.evaluation.intervals import Estimate, estimate
 from stylesim.evaluation.metrics import MISS_THRESHOLD_M, forecast_errors
-from stylesim.forecast import Forecaster, ForecastTask, covered
+from stylesim.forecast import Forecaster, ForecastTask, covered, earlier_s
 from stylesim.scene import Scene
-from stylesim.windows import WindowSpec, target_agents
+from stylesim.windows import WindowSpec, earlier_scene, target_agents
 
 RATES = ("covers_own", "covers_twin", "covers_both")
 
@@ -50,6 +50,8 @@ def twin_forecasts(
     counts: Counter[str] = Counter()
     identical = 0
     for own, twin, driver, t0 in _pairs(corpora, counts):
+        for scene in (own, twin):
+            reveal(forecaster, scene)
         sides = [_question(scene, driver, t0, spec, (forecaster, *beside)) for scene in (own, twin)]
         if sides[0] is None or sides[1] is None:
             counts["switched driver not seen long enough, or not forecast by all"] += 1
@@ -103,7 +105,8 @@ def _question(
     agent = scene.tracks.agent_id.index(driver)
     if agent not in target_agents(scene, t0, spec):
         return None
-    task = ForecastTask(scene.history(t0, history), np.array([agent], np.int32), future, t0)
+    earlier = earlier_scene(scene, t0, history, earlier_s(answering))
+    task = ForecastTask(scene.history(t0, history), np.array([agent], np.int32), future, t0, earlier)
     if not covered(answering, task).all():
         return None
     return task, scene.tracks.position_m[agent, t0 + 1 : t0 + 1 + future][None]

@@ -16,8 +16,8 @@ from torch import Tensor
 
 from stylesim.corpus.files import write_whole
 from stylesim.errors import InputError
-from stylesim.forecasting.conditioner import StyleConditioner
-from stylesim.forecasting.conditioning import StyleCells
+from stylesim.forecasting.conditioner import FORMS, StyleConditioner
+from stylesim.forecasting.conditions import condition_of
 from stylesim.forecasting.config import ModelConfig
 from stylesim.forecasting.forecaster import TrainedForecaster
 from stylesim.forecasting.model import ForecastNetwork
@@ -111,4 +111,5 @@ def conditioner_from_dict(raw: Mapping[str, Any] | None) -> StyleConditioner | N
     from stylesim.forecasting.judging import LabelerJudges
 
     judges = LabelerJudges.from_dict(raw["judges"])
-    return StyleConditioner(raw["condition"], judges, StyleCells.from_dict(raw["cells"]))
+    form = FORMS[condition_of(raw["condition"]).form]
+    return StyleConditioner(raw["condition"], judges, form.from_dict(raw["cells"]))

@@ -2,19 +2,29 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, Protocol, runtime_checkable
 
 import numpy as np
-from jaxtyping import Int32, Int64
+from jaxtyping import Float32, Int32, Int64
 
-from stylesim.forecasting.conditioning import Measured, StyleCells
+from stylesim.errors import InputError
+from stylesim.forecasting.conditioning import StyleCells
+from stylesim.forecasting.conditions import EARLIER_S, Condition, condition_of
+from stylesim.forecasting.measured import Measured
+from stylesim.forecasting.random_cells import RandomCells
 from stylesim.forecasting.samples import SPLITS, Window
+from stylesim.forecasting.truth import Truth
+from stylesim.forecasting.vectors import StyleVectors
 from stylesim.randomness import stream
 from stylesim.scene import Scene
+from stylesim.windows import earlier_scene
 
 CLUSTERS, CONTEXTS = 3, 2  # REFERENCE section 4: K = 3 [ours]; highway, non-highway [paper]
+
+# What the network is given of each driver: a cell (z, k, c), -1 for the null token; or a vector, NaN for it.
+StyleCond = Int64[np.ndarray, "_ 3"] | Float32[np.ndarray, "_ _"]
 
 
 @runtime_checkable
@@ -37,37 +47,135 @@ class Judges(Protocol):
 
 @dataclass(frozen=True, eq=False)
 class StyleConditioner:
-    """From a history to (z, k, c)."""
+    """From a history to what the network is given. `cells` is whatever the condition makes of what was measured."""
 
     condition: str
     judges: Judges
-    cells: StyleCells
+    cells: StyleCells | StyleVectors | RandomCells
+
+    @property
+    def kind(self) -> Condition:
+        """What the condition tells, and where it takes it from."""
+        return condition_of(self.condition)
+
+    @property
+    def classes(self) -> tuple[str, ...]:
+        """Names of the styles that can be asked for."""
+        return self._what_if.classes
+
+    @property
+    def earlier_s(self) -> float:
+        """How many seconds before the history it would like to see."""
+        return EARLIER_S if self.kind.span == "earlier" else 0.0
 
     def style_cond(
-        self, history: Scene, agent_index: Int32[np.ndarray, " driver"], *, style: str | None = None
-    ) -> Int64[np.ndarray, "driver 3"]:
-        """(z, k, c) of these agents, -1 for the null token; with `style`, as if each of them were of that class."""
-        asked = None if style is None else self.cells.class_index(style)
-        return self.cells.assign(self.judges.measure(history, agent_index), style=asked)
+        self,
+        history: Scene,
+        agent_index: Int32[np.ndarray, " driver"],
+        *,
+        style: str | None = None,
+        earlier: Scene | None = None,
+        truth: Int64[np.ndarray, " driver"] | None = None,
+    ) -> StyleCond:
+        """(z, k, c) of these agents, or their vectors; with `style`, as if each of them were of that class.
+
+        `earlier` is what the scene showed before the history, for conditions that look at it; `truth` the true styles,
+        for the oracle alone: InputError where it has none.
+        """
+        seen = measured(self.kind, self.judges, history, agent_index, earlier=earlier)
+        if style is not None:
+            return self._what_if.assign(seen, style=self._what_if.class_index(style))
+        if self.kind.sees_future:
+            if truth is None:
+                raise InputError("an oracle must be told the true styles")
+            seen = seen.with_style(truth)
+        if isinstance(self.cells, RandomCells):
+            return self.cells.draw(driver_names(history, agent_index))
+        return self.cells.assign(seen)
+
+    @property
+    def _what_if(self) -> StyleCells | StyleVectors:
+        return self.cells.real if isinstance(self.cells, RandomCells) else self.cells
+
+    def network_settings(self) -> dict[str, int]:
+        """What the network's configuration must say."""
+        return self._what_if.network_settings()
 
     def to_dict(self) -> dict[str, Any]:
         """As plain JSON types."""
         return {"condition": self.condition, "judges": dict(self.judges.to_dict()), "cells": self.cells.to_dict()}
 
 
+FORMS: dict[str, type[StyleCells] | type[StyleVectors] | type[RandomCells]] = {
+    "cells": StyleCells,
+    "scores": StyleVectors,
+    "features": StyleVectors,
+    "random": RandomCells,
+}
+
+
+def driver_names(scene: Scene, agent_index: Int32[np.ndarray, " driver"]) -> list[str]:
+    """One name per driver, the same in all scenes of a unit."""
+    return [f"{scene.unit_id}/{scene.tracks.agent_id[i]}" for i in agent_index]
+
+
+def measured(
+    condition: Condition,
+    judges: Judges,
+    history: Scene,
+    agent_index: Int32[np.ndarray, " driver"],
+    *,
+    earlier: Scene | None,
+) -> Measured:
+    """What is known of these agents at t0: from the history, or also from the windows before it."""
+    latest = judges.measure(history, agent_index)
+    if condition.span != "earlier" or earlier is None:
+        return latest
+    steps = history.tracks.n_frames
+    ends = range(earlier.tracks.n_frames - 1, steps - 2, -steps)  # whole windows, the latest first
+    before = [judges.measure(earlier.history(end, steps), agent_index) for end in ends]
+    return Measured.averaged([latest, *before], len(judges.classes))
+
+
 def fit_conditioner(
     condition: str, judges: Judges, sample_windows: Iterable[Window], *, seed: int
-) -> tuple[StyleConditioner, Int64[np.ndarray, "sample 3"]]:
-    """The conditioner, its clusters fitted on the training windows, and (z, k, c) of every sample.
+) -> tuple[StyleConditioner, StyleCond]:
+    """The conditioner, its clusters or scales fitted on the training windows, and `style_cond` of every sample.
 
     The windows come in the order of the sample store; those of other splits are judged, never fitted on.
     """
-    parts, is_train = [], []
+    kind = condition_of(condition)
+    truth = Truth(judges, judges.classes, commanded=True) if kind.sees_future else None
+    earlier_s = EARLIER_S if kind.span == "earlier" else 0.0
+    parts: list[Measured] = []
+    is_train, drivers = [], []
     for window in sample_windows:
-        parts.append(judges.measure(window.history, window.targets))
+        before = earlier_scene(window.scene, window.t0, window.history.tracks.n_frames, earlier_s)
+        part = measured(kind, judges, window.history, window.targets, earlier=before)
+        parts.append(part if truth is None else part.with_style(truth.of_scene(window.scene)[window.targets]))
         is_train.append(np.full(len(window.targets), window.split == SPLITS[0]))
-    measured = Measured.joined(parts)
-    training = measured.rows(np.concatenate([np.zeros(0, bool), *is_train]))
+        drivers += driver_names(window.history, window.targets)
+    every = Measured.joined(parts)
+    cells, style = _encoded(kind, every, np.concatenate([np.zeros(0, bool), *is_train]), drivers, judges.classes, seed)
+    return StyleConditioner(condition, judges, cells), style
+
+
+def _encoded(
+    kind: Condition,
+    every: Measured,
+    is_train: np.ndarray[Any, np.dtype[np.bool_]],
+    drivers: Sequence[str],
+    classes: tuple[str, ...],
+    seed: int,
+) -> tuple[StyleCells | StyleVectors | RandomCells, StyleCond]:
+    """What the condition makes of the samples, fitted on those of the training split."""
+    training = every.rows(is_train)
+    if kind.form in ("scores", "features"):
+        vectors = StyleVectors.fit(training, classes, form=kind.form)
+        return vectors, vectors.assign(every)
     rng = stream(seed, 0, "", "style clusters")
-    cells = StyleCells.fit(training, judges.classes, clusters=CLUSTERS, contexts=CONTEXTS, rng=rng)
-    return StyleConditioner(condition, judges, cells), cells.assign(measured)
+    cells = StyleCells.fit(training, classes, clusters=CLUSTERS, contexts=CONTEXTS, rng=rng)
+    if kind.form == "random":
+        lots = RandomCells.fit(cells, cells.assign(training), seed=seed)
+        return lots, lots.draw(drivers)
+    return cells, cells.assign(every)

@@ -1,4 +1,4 @@
-"""`style_cond`: the (style, cluster, context) that a prediction is conditioned on, from observed history only.
+"""`StyleCells`: the (style, cluster, context) that a prediction is conditioned on, from observed history only.
 
 The style z is the class of TDBM or KDSC; the cluster k is the nearest of K centroids within that class on the four
 KDSC features; the context c says highway or not. Everything fitted (scalers, centroids, which cells are filled) is
@@ -16,49 +16,11 @@ from jaxtyping import Bool, Float64, Int64
 
 from stylesim.errors import InputError, unknown
 from stylesim.forecasting.intentions import kmeans, nearest_centre
-from stylesim.labels import UNDETERMINED, LabelFlag, StyleLabels
+from stylesim.forecasting.measured import CLUSTER_FEATURES, Measured
+from stylesim.labels import UNDETERMINED
 
-CLUSTER_FEATURES = ("max_abs_acceleration", "var_acceleration", "var_speed", "gamma")  # REFERENCE section 2 [paper]
 LEAST_IN_CELL = 20  # REFERENCE section 4: a cell with fewer training samples is given the null token [ours]
 NULL = -1
-
-
-@dataclass(frozen=True, eq=False)
-class Measured:
-    """What the history says of each driver, before clusters are known."""
-
-    style: Int64[np.ndarray, " row"]  # UNDETERMINED where unknown
-    feature: Float64[np.ndarray, "row 4"]  # CLUSTER_FEATURES; NaN where missing
-    highway: Int64[np.ndarray, " row"]  # 0 or 1
-
-    @classmethod
-    def of(cls, style: StyleLabels, kinematic: StyleLabels) -> Measured:
-        """Class from one method's labels, features from KDSC's; InputError if a label saw more than history."""
-        for labels in (style, kinematic):
-            if labels.span != "history":
-                raise InputError(f"{labels.method} labels of span {labels.span!r} cannot condition; only history can")
-        missing = set(CLUSTER_FEATURES) - set(kinematic.feature_names)
-        if missing:
-            raise InputError(f"{kinematic.method} labels lack the feature(s) {', '.join(sorted(missing))}")
-        columns = [kinematic.feature_names.index(name) for name in CLUSTER_FEATURES]
-        return cls(
-            style.style.astype(np.int64),
-            np.where(kinematic.missing, np.nan, kinematic.feature)[:, columns].astype(np.float64),
-            ((style.flags & LabelFlag.HIGHWAY) != 0).astype(np.int64),
-        )
-
-    @classmethod
-    def joined(cls, parts: Sequence[Measured]) -> Measured:
-        """One after the other."""
-        return cls(
-            np.concatenate([np.zeros(0, np.int64), *(p.style for p in parts)]),
-            np.concatenate([np.zeros((0, len(CLUSTER_FEATURES))), *(p.feature for p in parts)]),
-            np.concatenate([np.zeros(0, np.int64), *(p.highway for p in parts)]),
-        )
-
-    def rows(self, keep: Bool[np.ndarray, " row"]) -> Measured:
-        """The rows where `keep` is True."""
-        return Measured(self.style[keep], self.feature[keep], self.highway[keep])
 
 
 @dataclass(frozen=True, eq=False)
@@ -120,6 +82,10 @@ class StyleCells:
         if name not in self.classes:
             raise unknown("style", name, self.classes)
         return self.classes.index(name)
+
+    def network_settings(self) -> dict[str, int]:
+        """What the network's configuration must say."""
+        return dict(zip(("styles", "clusters", "contexts"), self.filled.shape, strict=True))
 
     def to_dict(self) -> dict[str, Any]:
         """As plain JSON types."""

@@ -8,7 +8,6 @@ from typing import Any
 from stylesim.errors import InputError, unknown
 from stylesim.windows import WindowSpec
 
-CONDITIONS = ("none", "tdbm", "kdsc")
 FUSIONS = ("early", "mid", "late")
 READINGS = ("R1", "R2", "R3", "R4", "R5")
 
@@ -35,7 +34,7 @@ class InputConfig:
 
 @dataclass(frozen=True)
 class ModelConfig:
-    """The network. `styles` = 0: no style embedding."""
+    """The network. `styles` = 0 and `style_features` = 0: no style embedding; one of the two may be more."""
 
     inputs: InputConfig
     width: int = 64
@@ -53,6 +52,8 @@ class ModelConfig:
     styles: int = 0
     clusters: int = 3
     contexts: int = 2
+    style_features: int = 0  # length of the style vector, for conditions of numbers instead of cells
+    style_parameters: int = 0  # the style is given at least so many, idle ones included: arms of equal size
     style_dropout: float = 0.125  # REFERENCE section 4: 10-15 %
 
     def __post_init__(self) -> None:
@@ -63,8 +64,15 @@ class ModelConfig:
             raise unknown("reading", self.reading, READINGS)
         if self.width % self.heads:
             raise InputError(f"width {self.width} is not a multiple of heads {self.heads}")
+        if self.styles and self.style_features:
+            raise InputError("a network is given cells of style or vectors of it, not both")
         if self.modes > self.queries:
             raise InputError(f"{self.modes} modes cannot be chosen from {self.queries} queries")
+
+    @property
+    def styled(self) -> bool:
+        """True for a network that takes a style."""
+        return self.styles > 0 or self.style_features > 0
 
     def to_dict(self) -> dict[str, Any]:
         """As plain JSON types."""

@@ -14,6 +14,7 @@ from torch import Tensor
 
 from stylesim.errors import InputError
 from stylesim.forecasting.batching import gather, to_target
+from stylesim.forecasting.conditioner import StyleCond
 from stylesim.forecasting.config import InputConfig
 from stylesim.forecasting.intentions import intentions
 from stylesim.forecasting.snapshot import STATE_VX
@@ -27,7 +28,7 @@ class Example:
     """Inputs, style and target of one batch."""
 
     inputs: TensorBatch
-    style: Tensor  # [batch 3] (z, k, c)
+    style: Tensor  # [batch 3] (z, k, c), or [batch number]
     future_m: Float[Tensor, "batch time 2"]  # frame of the target at t0
     group: Int64[Tensor, " batch"] | None = None  # what the sample counts for; never an input
 
@@ -40,7 +41,7 @@ class TrainingData:
     """
 
     store: SampleStore
-    style: Int64[np.ndarray, "sample 3"]
+    style: StyleCond  # one row per sample
     config: InputConfig
     sampling: Float64[np.ndarray, " train"] | None = None
     group: Int64[np.ndarray, " sample"] | None = None

@@ -2,21 +2,24 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 
 import numpy as np
 import torch
-from jaxtyping import Float32, Int64
+from jaxtyping import Float32
 
 from stylesim.errors import InputError
 from stylesim.forecast import Forecast, ForecastTask
 from stylesim.forecasting.batching import gather, to_scene
-from stylesim.forecasting.conditioner import StyleConditioner
+from stylesim.forecasting.conditioner import StyleCond, StyleConditioner
+from stylesim.forecasting.conditioning import NULL
 from stylesim.forecasting.config import ModelConfig
 from stylesim.forecasting.model import ForecastNetwork
 from stylesim.forecasting.samples import RoadCutter, add_window
 from stylesim.forecasting.store import MemorySink, SampleStore, StoreBuilder
 from stylesim.forecasting.tensors import TensorBatch
+from stylesim.forecasting.truth import TrueStyles, Truth, looked_up
+from stylesim.scene import Scene
 
 BATCH_DRIVERS = 64  # drivers per forward pass; chosen: more did not make it faster on two cores
 NO_STYLE = "none"  # as `style` of predict: the null token for everyone
@@ -27,13 +30,14 @@ class TrainedForecaster:
     """Forecasts by a network; `conditioner` is None where it was trained without style."""
 
     def __init__(self, name: str, network: ForecastNetwork, conditioner: StyleConditioner | None) -> None:
-        if (conditioner is None) != (network.config.styles == 0):
+        if (conditioner is None) != (not network.config.styled):
             raise ValueError("a network with a style embedding needs a conditioner, and only such a one")
         self.name = name
         self.network = network.eval()
         self.conditioner = conditioner
         self.training_curve: tuple[Mapping[str, float], ...] = ()  # one record per epoch, where the folder has them
         self._cutter = RoadCutter(network.config.inputs)
+        self._truth: TrueStyles = {}  # for an oracle
 
     @property
     def config(self) -> ModelConfig:
@@ -48,7 +52,27 @@ class TrainedForecaster:
     @property
     def styles(self) -> tuple[str, ...]:
         """The styles that `predict(style=...)` knows; () for a model without style."""
-        return () if self.conditioner is None else self.conditioner.cells.classes
+        return () if self.conditioner is None else self.conditioner.classes
+
+    @property
+    def earlier_s(self) -> float:
+        """How many seconds before the history it would like to see (`ForecastTask.earlier`)."""
+        return 0.0 if self.conditioner is None else self.conditioner.earlier_s
+
+    @property
+    def sees_future(self) -> bool:
+        """True for an oracle, which must be told the truth (`reveal`): for benchmarks only."""
+        return self.conditioner is not None and self.conditioner.kind.sees_future
+
+    def reveal(self, scenes: Iterable[Scene]) -> None:
+        """Tell an oracle the true styles in these scenes: the commanded ones, else the classes of whole tracks.
+
+        InputError for any other model: nothing but the oracle may see the future.
+        """
+        if self.conditioner is None or not self.sees_future:
+            raise InputError(f"{self.name} is no oracle; it must not be told the true styles")
+        judges = self.conditioner.judges
+        self._truth = {**self._truth, **Truth(judges, judges.classes, commanded=True).of_scenes(scenes)}
 
     def predict(self, tasks: Sequence[ForecastTask], style: str | None = None) -> list[Forecast]:
         """Modes for every task, in the frame of its scene.
@@ -57,18 +81,40 @@ class TrainedForecaster:
         would do if he were of that class, "none" asks without any style. InputError for tasks of another time
         step, a longer future than the model was trained for, or an agent that is not known at t0.
         """
-        if style not in (None, NO_STYLE) and self.conditioner is None:
-            raise InputError(f"{self.name} was trained without style; it cannot answer style={style!r}")
         for task in tasks:
             self._check(task)
+        return self.predict_given(tasks, [self.style_cond(task, style) for task in tasks])
+
+    def style_cond(self, task: ForecastTask, style: str | None = None) -> StyleCond:
+        """What the network is told of each driver of a task: cells (z, k, c) or vectors; see `predict` for `style`.
+
+        InputError for a style that the model does not know, and for an oracle that has not been told the truth.
+        """
+        if self.conditioner is None:
+            if style not in (None, NO_STYLE):
+                raise InputError(f"{self.name} was trained without style; it cannot answer style={style!r}")
+            return np.full((len(task.agent_index), 3), NULL, np.int64)
+        if style == NO_STYLE:
+            assert self.network.style is not None
+            return self.network.style.unknown(len(task.agent_index), torch.device("cpu")).numpy()
+        truth = None
+        if self.sees_future and style is None:
+            truth = looked_up(self._truth, task.scene, task.agent_index)
+        return self.conditioner.style_cond(task.scene, task.agent_index, style=style, earlier=task.earlier, truth=truth)
+
+    def predict_given(self, tasks: Sequence[ForecastTask], cond: Sequence[StyleCond]) -> list[Forecast]:
+        """As `predict`, the style being what `cond` says of the drivers of each task (rows as of `style_cond`)."""
+        for task, given in zip(tasks, cond, strict=True):
+            self._check(task)
+            if len(given) != len(task.agent_index):
+                raise InputError(f"{len(given)} styles were given for {len(task.agent_index)} drivers of a task")
         if not tasks:
             return []
         sink = MemorySink(self.config.inputs)
         builder = StoreBuilder(sink)
         rows = [add_window(builder, self._cutter, t.scene, t.agent_index, self.config.inputs) for t in tasks]
         sink.append("sample", np.concatenate(rows))
-        cond = np.concatenate([self._style_cond(task, style) for task in tasks])
-        path, probability = self._modes(sink.store(), cond)
+        path, probability = self._modes(sink.store(), np.concatenate(list(cond)))
         result, start = [], 0
         for task in tasks:
             stop = start + len(task.agent_index)
@@ -93,13 +139,8 @@ class TrainedForecaster:
                     "choose the agents with windows.target_agents"
                 )
 
-    def _style_cond(self, task: ForecastTask, style: str | None) -> Int64[np.ndarray, "driver 3"]:
-        if self.conditioner is None or style == NO_STYLE:
-            return np.full((len(task.agent_index), 3), -1, np.int64)
-        return self.conditioner.style_cond(task.scene, task.agent_index, style=style)
-
     def _modes(
-        self, store: SampleStore, cond: Int64[np.ndarray, "sample 3"]
+        self, store: SampleStore, cond: StyleCond
     ) -> tuple[Float32[np.ndarray, "sample mode time 2"], Float32[np.ndarray, "sample mode"]]:
         config = self.config
         device = next(self.network.parameters()).device

@@ -7,15 +7,16 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from jaxtyping import Int32
+from jaxtyping import Int32, Int64
 
 from stylesim.corpus import Corpus
 from stylesim.errors import InputError, unknown
-from stylesim.forecasting.conditioning import Measured
+from stylesim.forecasting.measured import Measured
 from stylesim.labelers.base import Labeler, Progress
 from stylesim.labelers.history import history_labels
 from stylesim.labelers.kdsc import KDSC
 from stylesim.labelers.tdbm import TDBM
+from stylesim.labels import UNDETERMINED
 from stylesim.scene import Scene
 from stylesim.style import STYLE_CLASSES
 from stylesim.windows import WindowSpec
@@ -53,6 +54,14 @@ class LabelerJudges:
             return Measured.of(kinematic, kinematic)
         style = history_labels(self.style, history, agent_index, history_s=self.history_s)
         return Measured.of(style, kinematic)
+
+    def whole_track(self, scene: Scene, agent_index: Int32[np.ndarray, " driver"]) -> Int64[np.ndarray, " driver"]:
+        """The class over the whole scene, future included: for the oracle, and as a target to learn."""
+        labels = self.style.label_windows(scene, span="track", agents=agent_index)
+        row = {name: number for number, name in enumerate(labels.agent_id)}
+        names = (scene.tracks.agent_id[i] for i in agent_index)
+        style = np.append(labels.style.astype(np.int64), UNDETERMINED)  # the last: whoever has no row
+        return style[[row.get(name, -1) for name in names]]
 
     def to_dict(self) -> dict[str, Any]:
         """As plain JSON types; `style` is None where KDSC is both."""

@@ -18,9 +18,11 @@ from stylesim.forecasting.head import Head, Modes
 from stylesim.forecasting.intentions import SPEED_EDGES_MPS
 from stylesim.forecasting.layers import DecoderLayer, EncoderLayer, PatchEncoder, Perceptron, key_bias, scale
 from stylesim.forecasting.selection import selected_queries
-from stylesim.forecasting.style_embedding import StyleContextEmbedding
+from stylesim.forecasting.style_vector import idle_parameters, style_module
 from stylesim.forecasting.tensors import TensorBatch
 
+# (z, k, c) with z < 0 for unknown; or a style vector, NaN for unknown
+StyleTensor = Int[Tensor, "batch 3"] | Float[Tensor, "batch feature"]
 METRE, MPS, SECOND = 0.05, 0.1, 0.2  # features of 20 m, 10 m/s, 5 s become 1
 
 
@@ -107,7 +109,8 @@ class ForecastNetwork(nn.Module):
             DecoderLayer(width, config.heads, config.dropout) for _ in range(config.decoder_layers)
         )
         self.heads = nn.ModuleList(Head(config) for _ in range(config.decoder_layers))
-        self.style = self._style_embedding(config)
+        self.style = style_module(config)  # last, so that the rest starts alike with and without it
+        self.register_parameter("idle", idle_parameters(config, self.style))
         self.register_buffer("intention_mps2", torch.zeros(len(SPEED_EDGES_MPS) + 1, config.queries, 2))
         self.register_buffer("speed_edges", torch.tensor(SPEED_EDGES_MPS), persistent=False)
         time = torch.arange(1, inputs.future_steps + 1, dtype=torch.float32) * inputs.dt_s
@@ -115,20 +118,6 @@ class ForecastNetwork(nn.Module):
         self.intention_mps2: Tensor
         self.speed_edges: Tensor
         self.time_s: Tensor
-
-    @staticmethod
-    def _style_embedding(config: ModelConfig) -> StyleContextEmbedding | None:
-        if not config.styles:
-            return None
-        return StyleContextEmbedding(
-            styles=config.styles,
-            width=config.width,
-            clusters=config.clusters,
-            contexts=config.contexts,
-            reading=config.reading,
-            rank=config.rank,
-            dropout=config.style_dropout,
-        )
 
     def anchors(self, batch: TensorBatch) -> Float[Tensor, "batch query time 2"]:
         """The path of each intention: the velocity of t0 and a constant acceleration, one set per speed group."""
@@ -140,10 +129,10 @@ class ForecastNetwork(nn.Module):
     def forward(
         self,
         batch: TensorBatch,
-        style: Int[Tensor, "batch 3"] | None = None,
+        style: StyleTensor | None = None,
         learner: Int[Tensor, " batch"] | None = None,
     ) -> list[Modes]:
-        """The mixture after every decoder layer, the last one best. `style` rows are (z, k, c), z < 0 unknown.
+        """The mixture after every decoder layer, the last one best. Rows of `style`: see `StyleTensor`.
 
         `learner` names the query of each sample whose path is wanted, where that is one only: in training.
         """
@@ -162,7 +151,7 @@ class ForecastNetwork(nn.Module):
         return modes
 
     def predict(
-        self, batch: TensorBatch, style: Int[Tensor, "batch 3"] | None = None
+        self, batch: TensorBatch, style: StyleTensor | None = None
     ) -> tuple[Float[Tensor, "batch mode time 2"], Float[Tensor, "batch mode"]]:
         """The modes that are kept (`selected_queries`), most probable first, and their probabilities.
 
@@ -182,11 +171,11 @@ class ForecastNetwork(nn.Module):
         row = torch.arange(len(kept), device=kept.device)[:, None]
         return head.mean(query[row, kept], anchor[row, kept]), chance
 
-    def _encoded(self, batch: TensorBatch, style: Int[Tensor, "batch 3"] | None) -> Encoded:
+    def _encoded(self, batch: TensorBatch, style: StyleTensor | None) -> Encoded:
         embedding = None
         if self.style is not None:
-            unknown = torch.full((len(batch.agent), 3), -1, device=batch.agent.device)
-            embedding = self.style(unknown if style is None else style)  # [batch width]
+            given = self.style.unknown(len(batch.agent), batch.agent.device) if style is None else style
+            embedding = self.style(given)  # [batch width]
         fusion = self.config.fusion if embedding is not None else "none"
         bias = key_bias(batch.token_valid)
         agent, piece = self.encoder(batch, bias, embedding if fusion == "early" else None)

@@ -77,6 +77,10 @@ class StyleContextEmbedding(nn.Module):
         z, k, c = style.clamp(min=0).unbind(dim=1)
         return torch.where(known[:, None], self._table(z, k, c), self.null)
 
+    def unknown(self, batch: int, device: torch.device) -> Int[Tensor, "batch 3"]:
+        """What asks for the null token."""
+        return torch.full((batch, 3), -1, device=device)
+
     def _table(
         self, z: Int[Tensor, " batch"], k: Int[Tensor, " batch"], c: Int[Tensor, " batch"]
     ) -> Float[Tensor, "batch width"]:
@@ -93,12 +97,13 @@ class StyleContextEmbedding(nn.Module):
 def style_parameter_groups(model: nn.Module, *, lr: float, weight_decay: float) -> list[dict[str, Any]]:
     """Groups for an optimizer: weight decay on matrices only, none on style embeddings, which learn faster."""
     style = {id(p) for m in model.modules() if isinstance(m, StyleContextEmbedding) for p in m.parameters()}
-    rest = [p for p in model.parameters() if id(p) not in style]
+    learned = [p for p in model.parameters() if p.requires_grad]
+    rest = [p for p in learned if id(p) not in style]
     groups: list[dict[str, Any]] = [
         {"params": [p for p in rest if p.ndim >= 2], "lr": lr, "weight_decay": weight_decay},
         {"params": [p for p in rest if p.ndim < 2], "lr": lr, "weight_decay": 0.0},
     ]
     if style:
-        embedding = [p for p in model.parameters() if id(p) in style]
+        embedding = [p for p in learned if id(p) in style]
         groups.append({"params": embedding, "lr": lr * STYLE_LR_FACTOR, "weight_decay": 0.0})
     return groups

@@ -6,20 +6,18 @@ import json
 import shutil
 from collections.abc import Callable, Sequence
 from dataclasses import asdict, dataclass
-from itertools import chain
 from pathlib import Path
 from typing import Any
 
-import numpy as np
 import torch
 
 from stylesim.corpus import Corpus
 from stylesim.errors import InputError, unknown
 from stylesim.forecasting.augmenting import added_view
 from stylesim.forecasting.checkpoint import MODEL_FILE, RECORD_FILE, load, save
-from stylesim.forecasting.conditioner import Judges, StyleConditioner, fit_conditioner
-from stylesim.forecasting.config import CONDITIONS, VIEWS, InputConfig, ModelConfig, model_config
-from stylesim.forecasting.data import TrainingData
+from stylesim.forecasting.conditioner import Judges
+from stylesim.forecasting.conditions import CONDITIONS, model_name
+from stylesim.forecasting.config import VIEWS, InputConfig, ModelConfig, model_config
 from stylesim.forecasting.devices import runtime
 from stylesim.forecasting.forecaster import TrainedForecaster
 from stylesim.forecasting.loop import STATE_FILE, Loop, TrainSettings
@@ -27,14 +25,13 @@ from stylesim.forecasting.mixing import MixedData, TrainingSet
 from stylesim.forecasting.model import ForecastNetwork
 from stylesim.forecasting.reweighting import group_report, identified, loss_weigher, with_groups
 from stylesim.forecasting.robust import RobustSettings
-from stylesim.forecasting.samples import SPLITS, Progress, compiled, windows
-from stylesim.forecasting.store import SampleStore
+from stylesim.forecasting.samples import SPLITS, Progress, compiled
+from stylesim.forecasting.styling import styled_data, with_styles
 from stylesim.forecasting.training_folder import check_same, opened, write_json
 from stylesim.randomness import stream
 from stylesim.resources import cache_dir
 from stylesim.windows import WindowSpec
 
-NULL_STYLE = -1
 FIRST_FOLDER = "identification"  # of the first model that JTT trains
 
 
@@ -45,6 +42,7 @@ def train(
     fusion: str = "early",
     size: str = "tiny",
     reading: str = "R1",
+    style_dropout: float = 0.125,
     spec: WindowSpec = WindowSpec(),
     seed: int = 0,
     out: str | Path,
@@ -65,12 +63,14 @@ def train(
 ) -> TrainedForecaster:
     """Train on the split "train", stop early on "val", and leave the model in the folder `out`.
 
-    `condition` is "none", "tdbm" or "kdsc": the style that the history shows, added to the network at `fusion`
-    ("early", "mid" or "late"). `judges` are fitted labellers to use in place of ones fitted here on the training
-    split. `cache` is where compiled samples are kept. The same seed gives the same weights (same machine, same
-    number of threads); `out` appears under its name only when whole, and `resume` continues OUT.partial with the
-    last finished epoch. `out` holds model.pt and training.json (settings, loss curve). InputError for a corpus
-    without those splits, unknown names, or an `out` that exists.
+    `condition` is one of `conditions.CONDITIONS` ("none", "tdbm", "tdbm_scores", ...): what the history shows of the
+    style, added to the network at `fusion` ("early", "mid" or "late"); docs/forecasting.md describes them. Whatever
+    the condition, the network has the same number of parameters. `style_dropout` is the share of training samples
+    whose style is hidden, so that the model also works without it. `judges` are fitted labellers to use in place of
+    ones fitted here on the training split. `cache` is where compiled samples are kept. The same seed gives the same
+    weights (same machine, same number of threads); `out` appears under its name only when whole, and `resume`
+    continues OUT.partial with the last finished epoch. `out` holds model.pt and training.json (settings, loss curve).
+    InputError for a corpus without those splits, unknown names, or an `out` that exists.
 
     `robust` says what to do for rare drivers: names as "balanced,jtt", or `RobustSettings`. `augment` is a corpus,
     usually generated, from which the share `augment_share` of every batch is taken at equal gradient steps
@@ -84,7 +84,7 @@ def train(
         seed=seed, epochs=epochs, max_steps=max_steps, batch_size=batch_size, lr=lr, patience=patience
     )
     inputs = InputConfig.of(spec, _time_step(corpus), **VIEWS.get(size, {}))
-    config = model_config(size, inputs, fusion=fusion, reading=reading)
+    config = model_config(size, inputs, fusion=fusion, reading=reading, style_dropout=style_dropout)
     robust = RobustSettings.of(robust)
     added = None if augment is None else added_view(corpus, augment, augment_share)
     out = Path(out)
@@ -96,6 +96,7 @@ def train(
         "settings": asdict(settings),
         "fusion": fusion,
         "reading": reading,
+        "style_dropout": style_dropout,
         "robust": json.loads(json.dumps(asdict(robust))),
         "augment": None if added is None else added.to_dict(),
     }
@@ -108,9 +109,9 @@ def train(
     stores = [
         compiled(c, spec, inputs, cache or cache_dir(), progress=watch.begin("compiling samples")) for c in corpora
     ]
-    conditioner, parts = _styled(corpora, condition, spec, stores, inputs, judges, seed, watch)
+    conditioner, parts = styled_data(corpora, condition, spec, stores, inputs, judges, seed=seed, begin=watch.begin)
     data: TrainingSet = parts[0] if added is None else MixedData(parts[0], parts[1], added.share)
-    config = _with_styles(config, conditioner)
+    config = with_styles(config, conditioner)
     groups: tuple[str, ...] = ()
     if robust.grouped:
         data, groups = with_groups(data, corpora, robust)
@@ -122,8 +123,7 @@ def train(
     loop = Loop(_network(config, data, seed), data, settings, runtime=place, folder=folder, weigher=weigher)
     loop.restore()
     loop.run(watch.begin("training"))
-    name = size if condition == "none" else f"{size}-{condition}-{fusion}"
-    forecaster = TrainedForecaster(name, loop.network, conditioner)
+    forecaster = TrainedForecaster(model_name(size, condition, fusion), loop.network, conditioner)
     save(forecaster, folder / MODEL_FILE)
     write_json(folder / RECORD_FILE, {**record, **_outcome(loop), "groups": group_report(data, groups, weigher)})
     _close(folder, out)
@@ -178,42 +178,3 @@ def _time_step(corpus: Corpus) -> float:
     if len(steps) > 1:
         raise InputError(f"{corpus.path} mixes time steps {sorted(steps)}: bring it to one with `stylesim merge`")
     return float(steps.pop())
-
-
-def _styled(
-    corpora: Sequence[Corpus],
-    condition: str,
-    spec: WindowSpec,
-    stores: Sequence[SampleStore],
-    inputs: InputConfig,
-    judges: Judges | None,
-    seed: int,
-    watch: _Watch,
-) -> tuple[StyleConditioner | None, list[TrainingData]]:
-    """The conditioner fitted on the training split, and the samples of each corpus with their style.
-
-    The first corpus alone has validation samples, and labellers are fitted on it alone.
-    """
-    conditioner = None
-    style = np.full((sum(map(len, stores)), 3), NULL_STYLE, np.int64)
-    if condition != "none":
-        if judges is None:
-            from stylesim.forecasting.judging import LabelerJudges
-
-            told = watch.begin("fitting labellers")
-            judges = LabelerJudges.fit(condition, corpora[0].split("train"), spec, progress=told)
-        told = watch.begin("judging histories")
-        asked = chain.from_iterable(windows(corpus, spec, progress=told) for corpus in corpora)
-        conditioner, style = fit_conditioner(condition, judges, asked, seed=seed)
-    needed = SPLITS, SPLITS[:1]
-    cut = np.split(style, np.cumsum([len(store) for store in stores])[:-1])
-    return conditioner, [
-        TrainingData(store, rows, inputs, needed=need) for store, rows, need in zip(stores, cut, needed, strict=False)
-    ]
-
-
-def _with_styles(config: ModelConfig, conditioner: StyleConditioner | None) -> ModelConfig:
-    if conditioner is None:
-        return config
-    styles, clusters, contexts = conditioner.cells.filled.shape
-    return ModelConfig.from_dict({**config.to_dict(), "styles": styles, "clusters": clusters, "contexts": contexts})

@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 
 from stylesim.corpus import Corpus, CorpusWriter
-from stylesim.forecasting.conditioning import Measured
+from stylesim.forecasting.measured import Measured
 from stylesim.scene import Scene
 from stylesim.style import CLASS_KNOB
 from stylesim.styles import style_table

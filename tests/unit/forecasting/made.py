@@ -12,9 +12,10 @@ import torch
 from stylesim.corpus import Corpus, CorpusWriter
 from stylesim.forecast import ForecastTask
 from stylesim.forecasting.conditioner import StyleConditioner
-from stylesim.forecasting.conditioning import Measured, StyleCells
+from stylesim.forecasting.conditioning import StyleCells
 from stylesim.forecasting.config import InputConfig, model_config
 from stylesim.forecasting.forecaster import TrainedForecaster
+from stylesim.forecasting.measured import Measured
 from stylesim.forecasting.model import ForecastNetwork
 from stylesim.labels import UNDETERMINED, LabelFlag, StyleLabels
 from stylesim.scene import Scene
@@ -48,7 +49,7 @@ def conditioner(judges: Any = None, *, seed: int = 0) -> StyleConditioner:
     rng = np.random.default_rng(seed)
     measured = Measured(rng.integers(0, 2, 800), rng.uniform(0, 15, (800, 4)), rng.integers(0, 2, 800))
     cells = StyleCells.fit(measured, SpeedJudges.classes, clusters=3, contexts=2, rng=rng)
-    return StyleConditioner("made", judges or SpeedJudges(), cells)
+    return StyleConditioner("tdbm", judges or SpeedJudges(), cells)
 
 
 def untrained(*, styled: bool = False, seed: int = 0, **changes: Any) -> TrainedForecaster:

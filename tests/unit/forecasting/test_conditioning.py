@@ -7,7 +7,8 @@ import pytest
 
 from stylesim.errors import InputError
 from stylesim.forecasting.conditioner import fit_conditioner
-from stylesim.forecasting.conditioning import CLUSTER_FEATURES, LEAST_IN_CELL, NULL, Measured, StyleCells
+from stylesim.forecasting.conditioning import LEAST_IN_CELL, NULL, StyleCells
+from stylesim.forecasting.measured import CLUSTER_FEATURES, Measured
 from stylesim.forecasting.samples import Window
 from stylesim.labels import LabelFlag, StyleLabels
 from stylesim.scene import Scene
@@ -130,8 +131,8 @@ def window(scene: Scene, split: str) -> Window:
 def test_clusters_are_fitted_on_the_training_split_only() -> None:
     train = [window(make_scene(f"s{i}", seed=i), "train") for i in range(12)]
     others = [window(make_scene(f"v{i}", seed=100 + i), "val") for i in range(5)]
-    alone, _ = fit_conditioner("made", SpeedJudges(), train, seed=0)
-    mixed, style = fit_conditioner("made", SpeedJudges(), [*others, *train], seed=0)
+    alone, _ = fit_conditioner("tdbm", SpeedJudges(), train, seed=0)
+    mixed, style = fit_conditioner("tdbm", SpeedJudges(), [*others, *train], seed=0)
     np.testing.assert_array_equal(alone.cells.centre, mixed.cells.centre)
     np.testing.assert_array_equal(alone.cells.filled, mixed.cells.filled)
     assert len(style) == 4 * 17

@@ -13,9 +13,10 @@ from stylesim.corpus import Corpus
 from stylesim.datasets.reading import read
 from stylesim.forecasting.batching import Batch, gather
 from stylesim.forecasting.conditioner import StyleConditioner
-from stylesim.forecasting.conditioning import Measured, StyleCells
+from stylesim.forecasting.conditioning import StyleCells
 from stylesim.forecasting.config import InputConfig
 from stylesim.forecasting.judging import LabelerJudges
+from stylesim.forecasting.measured import Measured
 from stylesim.forecasting.samples import RoadCutter, add_window
 from stylesim.forecasting.store import MemorySink, StoreBuilder
 from stylesim.scene import Scene
