@@ -21,6 +21,7 @@ from stylesim.experiments.arms import read_request
 from stylesim.experiments.records import Run, read_runs, read_table
 
 METRIC = "min_fde_m"
+LEAST = MIN_DRIVERS, MIN_UNITS
 
 
 @dataclass(frozen=True, eq=False)
@@ -105,20 +106,21 @@ class Experiment:
         sizes = named.group_by("cell").agg(pl.len(), pl.col("unit_id").n_unique().alias("units")).rows()
         return {cell: (n, units) for cell, n, units in sorted(sizes, key=lambda row: value_order(row[0]))}
 
-    def worst(self, arm: str, by: str, *, split: str = "val", metric: str = METRIC) -> str:
-        """The cell of `by` in which the arm's mean error is largest, of those that may be shown.
+    def worst(
+        self, arm: str, by: str, *, split: str = "val", metric: str = METRIC, least: tuple[int, int] = LEAST
+    ) -> str:
+        """The cell of `by` in which the arm's mean error is largest, of those with `least` (drivers, units).
 
-        Choose it once, on "val", and follow it on "test". InputError where no cell has enough drivers and units.
+        Choose it once, on "val", and follow it on "test". The default is what may be shown; a smaller choice says no
+        more than where to look on "test". InputError where no cell has enough drivers and units.
         """
         means = {}
         for cell, (drivers, units) in self.cells(by, split=split).items():
-            if drivers >= MIN_DRIVERS and units >= MIN_UNITS and cell not in LAST:
+            if drivers >= least[0] and units >= least[1] and cell not in LAST:
                 errors = self._errors(arm, self.seeds(arm), metric, split, by, cell)
                 means[cell] = float(errors.value.mean())
         if not means:
-            raise InputError(
-                f"{self.path}: no cell of {by!r} has {MIN_DRIVERS} drivers of {MIN_UNITS} units on {split!r}"
-            )
+            raise InputError(f"{self.path}: no cell of {by!r} has {least[0]} drivers of {least[1]} units on {split!r}")
         return max(means, key=lambda cell: means[cell])
 
     @cached_property
