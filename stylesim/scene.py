@@ -54,7 +54,8 @@ class Scene:
     def history(self, t0: int, steps: int) -> Scene:
         """What is known at frame t0 (see `Tracks.history`): no later frame, no commanded style, no outcome.
 
-        `counts`, `parameters` and `metadata` go too: a drawn cycle time would tell when the light changes.
+        `counts`, `parameters` and `metadata` go too: a drawn cycle time would tell when the light changes. So do
+        `twin_of` and `replay_of`: that an episode has a counterfactual is nothing that its history shows.
         """
         tracks = self.tracks.history(t0, steps)
         first = t0 + 1 - tracks.n_frames
@@ -68,4 +69,6 @@ class Scene:
             parameters={},
             metadata={},
             t0_frame=None,
+            twin_of="",
+            replay_of="",
         )

@@ -96,7 +96,7 @@ def yellow_approaches(scenes: Iterable[Scene]) -> Approaches:
     )
 
 
-def _onsets(scene: Scene) -> dict[int, list[tuple[int, Lane]]]:
+def onsets(scene: Scene) -> dict[int, list[tuple[int, Lane]]]:
     """By frame, the (light, lane) that turn from green to yellow in it, for lanes that have a stop line."""
     found: dict[int, list[tuple[int, Lane]]] = defaultdict(list)
     if scene.signals is None or scene.road is None:
@@ -114,12 +114,12 @@ def _of_scene(scene: Scene, counts: Counter[str]) -> Iterator[tuple[object, ...]
     half = np.nan_to_num(tracks.size_m[:, 0].astype(np.float64)) / 2
     stop, go = tracks.flagged(TrackFlag.DECIDED_STOP), tracks.flagged(TrackFlag.DECIDED_GO)
     decided = np.where(stop != go, np.where(stop, 1, 0), -1)
-    for frame, lights in _onsets(scene).items():
+    for frame, lights in onsets(scene).items():
         assert scene.signals is not None
         here = np.flatnonzero(tracks.valid[:, frame])
         if not len(here):
             continue
-        ahead, away, line_at = _places(tracks.position_m[here, frame], half[here], [lane for _, lane in lights])
+        ahead, away, line_at = places(tracks.position_m[here, frame], half[here], [lane for _, lane in lights])
         nearest = np.argmin(away, axis=0)
         for row, (light, lane) in enumerate(lights):
             on = (nearest == row) & (away[row] <= LANE_REACH_M) & (ahead[row] > 0)
@@ -145,7 +145,7 @@ def _of_scene(scene: Scene, counts: Counter[str]) -> Iterator[tuple[object, ...]
                 yield (*start, found.stopped, found.ran_red, found.response_s, found.deceleration_mps2)
 
 
-def _places(
+def places(
     points_m: Float[np.ndarray, "agent 2"], half_m: Float64[np.ndarray, " agent"], lanes: Sequence[Lane]
 ) -> tuple[Float64[np.ndarray, "lane agent"], Float64[np.ndarray, "lane agent"], list[float]]:
     """From each front to each lane's stop line, from each centre to the lane, and where on the lane the line is."""

@@ -2,96 +2,33 @@
 
 from __future__ import annotations
 
-import json
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
-from pathlib import Path
-from typing import Any
+from collections.abc import Callable, Sequence
 
 import numpy as np
 import polars as pl
 
-from stylesim.corpus.files import json_bytes, write_whole
 from stylesim.errors import InputError
-from stylesim.evaluation.conformal import ALPHA, Region, regions_of
+from stylesim.evaluation.conformal import regions_of
 from stylesim.evaluation.evaluate import common_spec, how_asked
 from stylesim.evaluation.metrics import MODES
 from stylesim.evaluation.reliability import Reliability, reliability
 from stylesim.evaluation.results import Evaluation
-from stylesim.evaluation.slices import ALL, Slice, all_slices, cell, driver_table, value_order
+from stylesim.evaluation.slices import ALL, CROSS, Slice, all_slices, cell, driver_table, value_order
 from stylesim.evaluation.strata import check_strata
 from stylesim.evaluation.stress_corpora import EVERYDAY, RARE, StressTraffic
-from stylesim.evaluation.stress_groups import Degradation, WorstGroup, degradation, worst_group
-from stylesim.evaluation.stress_twins import TwinForecasts, twin_forecasts
+from stylesim.evaluation.stress_criticality import by_criticality
+from stylesim.evaluation.stress_decisions import decisions
+from stylesim.evaluation.stress_groups import degradation, worst_group
+from stylesim.evaluation.stress_results import Coverage, Stress
+from stylesim.evaluation.stress_twins import twin_forecasts
 from stylesim.evaluation.stress_windows import EVENT, NO_EVENT, POPULATION, stress_windows, traffic_facts
+from stylesim.evaluation.twin_shift import twin_shift
 from stylesim.forecast import Forecaster
 from stylesim.randomness import stream
 from stylesim.windows import WindowSpec
 
-FORMAT = "stylesim-stress"
-SCHEMA_VERSION = 1
 STYLE = "commanded"
 BY = (STYLE, "scenario", f"{STYLE}*scenario")
-SUFFIX = ".stress.json"
-
-
-@dataclass(frozen=True, eq=False)
-class Coverage:
-    """Conformal regions: radii from half of the episodes of `calibrated_on`, coverage on `judged_on`, by style."""
-
-    calibrated_on: str
-    judged_on: str
-    pooled_radius_m: float
-    regions: tuple[Region, ...]
-
-    def to_dict(self) -> dict[str, Any]:
-        """Plain JSON values."""
-        return {
-            "calibrated_on": self.calibrated_on, "judged_on": self.judged_on, "alpha": ALPHA,
-            "pooled_radius_m": self.pooled_radius_m if np.isfinite(self.pooled_radius_m) else None,
-            "regions": [one.to_dict() for one in self.regions],
-        }  # fmt: skip
-
-
-@dataclass(frozen=True, eq=False)
-class Stress:
-    """What one forecaster did. `evaluation` has every cell's accuracy, the drivers, what was asked and what was not."""
-
-    evaluation: Evaluation
-    events: tuple[Slice, ...]  # by event, those who caused it apart
-    worst: WorstGroup | None
-    degradation: tuple[Degradation, ...]  # () for a corpus of one population
-    reliability: tuple[Reliability, ...]  # everybody, then by style; () for a forecaster of one mode
-    coverage: tuple[Coverage, ...]
-    twins: TwinForecasts | None = None  # None for traffic without twins
-
-    @property
-    def forecaster(self) -> str:
-        """Its name."""
-        return self.evaluation.forecaster
-
-    def to_dict(self) -> dict[str, Any]:
-        """Plain JSON values: all that the page shows."""
-        return {
-            "format": FORMAT,
-            "schema_version": SCHEMA_VERSION,
-            "forecaster": self.forecaster,
-            "accuracy": self.evaluation.to_dict(),
-            "events": [one.to_dict() for one in self.events],
-            "worst_group": None if self.worst is None else self.worst.to_dict(),
-            "degradation": [one.to_dict() for one in self.degradation],
-            "reliability": [one.to_dict() for one in self.reliability],
-            "coverage": [one.to_dict() for one in self.coverage],
-            "twins": None if self.twins is None else self.twins.to_dict(),
-        }
-
-    def save(self, stem: str | Path) -> Path:
-        """Write `<stem>.stress.json`, and the evaluation's .json, .md and .parquet beside it (`compare` reads them)."""
-        path = Path(stem)
-        self.evaluation.save(path.with_name(path.name + ".json"))
-        out = path.with_name(path.name + SUFFIX)
-        write_whole(out, json_bytes(self.to_dict()))
-        return out
 
 
 def stress(
@@ -136,7 +73,10 @@ def stress(
         degradation=degradation(moving, seed=seed),
         reliability=_reliabilities(moving, seed, modes),
         coverage=_coverages(moving, traffic, seed),
+        criticality=by_criticality(moving, seed=seed),
+        decisions=decisions(forecaster, traffic.populations, spec=spec, modes=modes, seed=seed, beside=beside),
         twins=twin_forecasts(forecaster, traffic.twins, spec=spec, modes=modes, seed=seed, beside=beside),
+        shift=twin_shift(forecaster, traffic.twins, spec=spec, seed=seed, beside=beside),
     )
 
 
@@ -155,10 +95,14 @@ def _reliabilities(moving: pl.DataFrame, seed: int, modes: int) -> tuple[Reliabi
 
 
 def _coverages(moving: pl.DataFrame, traffic: StressTraffic, seed: int) -> tuple[Coverage, ...]:
-    """Within each population by halves of its episodes; and everyday regions held against rare traffic."""
+    """Within each population by halves of its episodes; and everyday regions held against rare traffic.
+
+    By style, and by style × scenario.
+    """
     scores = moving.select(
-        "unit_id", "agent_id", POPULATION, pl.col(STYLE).alias("group"), pl.col("min_fde_m").alias("score")
-    )
+        "unit_id", "agent_id", POPULATION, STYLE, pl.concat_str(STYLE, "scenario", separator=CROSS).alias(BY[-1]),
+        pl.col("min_fde_m").alias("score"),
+    )  # fmt: skip
     units = np.array(sorted(scores["unit_id"].unique().to_list()), dtype=object)
     half: list[str] = []
     for population in sorted(scores[POPULATION].unique().to_list()):
@@ -174,22 +118,10 @@ def _coverages(moving: pl.DataFrame, traffic: StressTraffic, seed: int) -> tuple
         known, test = (
             side.filter(pl.col(POPULATION) == name) for side, name in ((first, calibrated), (second, judged))
         )
-        if not (known.is_empty() or test.is_empty()):
-            regions, pooled = regions_of(known, test, seed=seed)
-            found.append(Coverage(calibrated, judged, pooled, regions))
+        if known.is_empty() or test.is_empty():
+            continue
+        for by in (STYLE, BY[-1]):
+            sides = (side.with_columns(pl.col(by).alias("group")) for side in (known, test))
+            regions, pooled = regions_of(*sides, seed=seed)
+            found.append(Coverage(by, calibrated, judged, pooled, regions))
     return tuple(found)
-
-
-def load_stress(path: str | Path) -> Mapping[str, Any]:
-    """What `Stress.save` wrote, as plain values; InputError if it is no such file."""
-    file = Path(path)
-    try:
-        raw = json.loads(file.read_text(encoding="utf-8"))
-        if raw["format"] != FORMAT or int(raw["schema_version"]) > SCHEMA_VERSION:
-            raise InputError(f"{file} is no stress test that this version of stylesim can read")
-    except FileNotFoundError:
-        raise InputError(f"no such file: {file}") from None
-    except (ValueError, KeyError, TypeError) as error:
-        raise InputError(f"{file} is no stress test: {error!r}") from error
-    found: Mapping[str, Any] = raw
-    return found

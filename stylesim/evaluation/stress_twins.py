@@ -3,36 +3,53 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+from jaxtyping import Float64
 
 from stylesim.corpus import Corpus
-from stylesim.evaluation.asking import checked_answers, reveal
 from stylesim.evaluation.intervals import Estimate, estimate
-from stylesim.evaluation.metrics import MISS_THRESHOLD_M, forecast_errors
-from stylesim.forecast import Forecaster, ForecastTask, covered, earlier_s
-from stylesim.scene import Scene
-from stylesim.windows import WindowSpec, earlier_scene, target_agents
+from stylesim.evaluation.metrics import MISS_THRESHOLD_M, forecast_errors, most_probable
+from stylesim.evaluation.mixtures import best_weights, energy_score
+from stylesim.evaluation.twin_pairs import FROM_START, NULL, TWIN, TwinPair, twin_answer, twin_pairs, twin_question
+from stylesim.forecast import Forecast, Forecaster
+from stylesim.windows import WindowSpec
 
 RATES = ("covers_own", "covers_twin", "covers_both")
+MIXTURE = ("score_m", "over_equal_m", "over_best_m")  # energy score; minus that of equal, and of the best weights
 
 
 @dataclass(frozen=True, eq=False)
 class TwinForecasts:
-    """Drivers whose style was switched at t0. A future is covered where a mode ends within 2 m of it."""
+    """Drivers whose style was switched at t0. A future is covered where a mode ends within 2 m of it.
+
+    `figures`: covers_own, covers_twin, covers_both (shares), apart_m (distance of both ends). `mixture` is of the two
+    futures as an equal mixture: "twin" of the driver's own and its twin's, "null" of its own and its null twin's, which
+    differ by chance alone. score_m is the energy score, over_equal_m what it exceeds that of the same modes with equal
+    probabilities by (below 0: the probabilities inform), over_best_m that of the best probabilities for that mixture.
+    """
 
     drivers: int
     identical: int  # forecasts of both pasts (which are the same, bit for bit) that are the same, bit for bit
-    figures: Mapping[str, Estimate]  # covers_own, covers_twin, covers_both (shares); apart_m: distance of both ends
+    figures: Mapping[str, Estimate]
+    mixture: Mapping[str, Mapping[str, Estimate]]
     counts: Mapping[str, int]
 
     def to_dict(self) -> dict[str, Any]:
         """Plain JSON values."""
-        figures = {name: value.to_dict() for name, value in self.figures.items()}
-        return {"drivers": self.drivers, "identical": self.identical, "figures": figures, "counts": dict(self.counts)}
+        return {
+            "drivers": self.drivers,
+            "identical": self.identical,
+            "figures": {name: value.to_dict() for name, value in self.figures.items()},
+            "mixture": {
+                pair: {name: value.to_dict() for name, value in figures.items()}
+                for pair, figures in self.mixture.items()
+            },
+            "counts": dict(self.counts),
+        }
 
 
 def twin_forecasts(
@@ -44,69 +61,79 @@ def twin_forecasts(
     seed: int,
     beside: Sequence[Forecaster] = (),
 ) -> TwinForecasts | None:
-    """Ask about every switched driver at its switch, of its own scene and of its twin's; None without twins."""
+    """Ask about every switched driver at its switch, of its own scene and of its twin's; None without twins.
+
+    Both tasks carry the episode's ids. A forecast that differs all the same has not only looked at the history.
+    """
     rows: dict[str, list[float]] = {name: [] for name in (*RATES, "apart_m")}
-    units: list[str] = []
+    scores: dict[str, list[tuple[float, ...]]] = {TWIN: [], NULL: []}
+    units: dict[str, list[str]] = {TWIN: [], NULL: []}
     counts: Counter[str] = Counter()
     identical = 0
-    for own, twin, driver, t0 in _pairs(corpora, counts):
-        for scene in (own, twin):
-            reveal(forecaster, scene)
-        sides = [_question(scene, driver, t0, spec, (forecaster, *beside)) for scene in (own, twin)]
-        if sides[0] is None or sides[1] is None:
+    for pair in twin_pairs(corpora, counts):
+        if pair.t0 is None:
+            counts[FROM_START] += 1
+            continue
+        answering = (forecaster, *beside)
+        own, twin = (twin_question(s, pair.own, pair.driver, pair.t0, spec, answering) for s in (pair.own, pair.twin))
+        if own is None or twin is None:
             counts["switched driver not seen long enough, or not forecast by all"] += 1
             continue
-        (task, truth), (other, other_truth) = sides[0], sides[1]
-        answer, again = (checked_answers(forecaster, [one])[0] for one in (task, other))  # one at a time: no batching
-        same = (answer.mode_m.tobytes(), answer.probability.tobytes()) == (
-            again.mode_m.tobytes(), again.probability.tobytes(),
-        )  # fmt: skip
-        identical += same
-        near = [
-            float(forecast_errors(one.mode_m, one.probability, end, k=modes).min_fde_m[0]) <= MISS_THRESHOLD_M
-            for one, end in ((answer, truth), (again, other_truth))
-        ]
-        rows["covers_own"].append(near[0])
-        rows["covers_twin"].append(near[1])
-        rows["covers_both"].append(all(near))
-        rows["apart_m"].append(float(np.linalg.norm(truth[0, -1] - other_truth[0, -1])))
-        units.append(f"{own.scenario}:{own.unit_id}")
-    if not (units or counts):
+        answer, again = twin_answer(forecaster, own), twin_answer(forecaster, twin)
+        identical += _same(answer, again)
+        near = [_covers(one, truth, modes) for one, truth in ((answer, own.truth_m), (again, twin.truth_m))]
+        for name, value in zip(RATES, (*near, all(near)), strict=True):
+            rows[name].append(value)
+        rows["apart_m"].append(float(np.linalg.norm(own.truth_m[0, -1] - twin.truth_m[0, -1])))
+        null = _null_truth(pair, spec, answering)
+        for name, other in ((TWIN, twin.truth_m), (NULL, null)):
+            if other is not None:
+                ends = np.stack([own.truth_m[0, -1], other[0, -1]]).astype(np.float64)
+                scores[name].append(_mixture(answer, ends, modes))
+                units[name].append(pair.unit)
+    if not (units[TWIN] or counts):
         return None
     figures = {
-        name: estimate(np.array(values, np.float64), units, seed=seed, purpose=f"twins {name}", rate=name in RATES)
+        name: estimate(
+            np.array(values, np.float64), units[TWIN], seed=seed, purpose=f"twins {name}", rate=name in RATES
+        )
         for name, values in rows.items()
     }
-    return TwinForecasts(len(units), identical, figures, dict(counts))
+    mixture = {
+        pair: {
+            name: estimate(column, units[pair], seed=seed, purpose=f"twins {pair} {name}")
+            for name, column in zip(MIXTURE, _columns(scores[pair]), strict=True)
+        }
+        for pair in scores
+    }
+    return TwinForecasts(len(units[TWIN]), identical, figures, mixture, dict(counts))
 
 
-def _pairs(corpora: Sequence[Corpus], counts: Counter[str]) -> Iterator[tuple[Scene, Scene, str, int]]:
-    """(episode, its twin, the driver, frame of the switch) of every twin that was switched on the way."""
-    for corpus in corpora:
-        known = {info.scene_id for info in corpus.info}
-        for info in corpus.info:
-            if not info.scene_id.endswith("-twin"):
-                continue
-            twin = corpus.scene(info.scene_id)
-            about = twin.metadata["twin"]
-            if about["at_s"] is None or twin.twin_of not in known:
-                counts["another style from the start, or without its episode"] += 1
-                continue
-            yield corpus.scene(twin.twin_of), twin, about["driver"], round(about["at_s"] / twin.tracks.dt_s)
+def _columns(rows: list[tuple[float, ...]]) -> Float64[np.ndarray, "figure driver"]:
+    return np.array(rows, np.float64).reshape(-1, len(MIXTURE)).T
 
 
-def _question(
-    scene: Scene, driver: str, t0: int, spec: WindowSpec, answering: Sequence[Forecaster]
-) -> tuple[ForecastTask, np.ndarray] | None:
-    """The task and the truth (1, time, 2); None where the driver cannot be asked."""
-    history, future, _ = spec.steps(scene.tracks.dt_s)
-    if driver not in scene.tracks.agent_id or t0 + future >= scene.tracks.n_frames:
+def _same(one: Forecast, other: Forecast) -> bool:
+    return (one.mode_m.tobytes(), one.probability.tobytes()) == (other.mode_m.tobytes(), other.probability.tobytes())
+
+
+def _covers(answer: Forecast, truth_m: np.ndarray, modes: int) -> bool:
+    errors = forecast_errors(answer.mode_m, answer.probability, truth_m, k=modes)
+    return float(errors.min_fde_m[0]) <= MISS_THRESHOLD_M
+
+
+def _null_truth(pair: TwinPair, spec: WindowSpec, answering: Sequence[Forecaster]) -> np.ndarray | None:
+    if pair.null is None or pair.t0 is None:
         return None
-    agent = scene.tracks.agent_id.index(driver)
-    if agent not in target_agents(scene, t0, spec):
-        return None
-    earlier = earlier_scene(scene, t0, history, earlier_s(answering))
-    task = ForecastTask(scene.history(t0, history), np.array([agent], np.int32), future, t0, earlier)
-    if not covered(answering, task).all():
-        return None
-    return task, scene.tracks.position_m[agent, t0 + 1 : t0 + 1 + future][None]
+    asked = twin_question(pair.null, pair.own, pair.driver, pair.t0, spec, answering)
+    return None if asked is None else asked.truth_m
+
+
+def _mixture(answer: Forecast, ends_m: Float64[np.ndarray, "2 2"], modes: int) -> tuple[float, float, float]:
+    """Energy score of the k most probable modes (scaled to sum to 1), and what it exceeds both yardsticks by."""
+    kept = most_probable(answer.probability, modes)[0]
+    place = answer.mode_m[0, kept, -1].astype(np.float64)
+    chance = answer.probability[0, kept].astype(np.float64)
+    score = energy_score(place, chance / chance.sum(), ends_m)
+    equal = energy_score(place, np.full(len(kept), 1.0 / len(kept)), ends_m)
+    return score, score - equal, score - energy_score(place, best_weights(place, ends_m), ends_m)

@@ -14,6 +14,7 @@ from stylesim.evaluation.asking import ask
 from stylesim.evaluation.evaluate import corpus_facts
 from stylesim.evaluation.strata import with_strata
 from stylesim.evaluation.stress_corpora import StressTraffic
+from stylesim.evaluation.stress_criticality import with_criticality
 from stylesim.forecast import Forecaster
 from stylesim.windows import WindowSpec
 
@@ -33,7 +34,7 @@ def stress_windows(
     beside: Sequence[Forecaster] = (),
     progress: Callable[[str, int, int], None] | None = None,
 ) -> tuple[pl.DataFrame, dict[str, int], dict[str, Any]]:
-    """(windows of `asking.ask` with `population` and `event`, counts, provenance of labels) over all corpora.
+    """(windows of `asking.ask` with `population`, `event` and criticality, counts, provenance of labels), all corpora.
 
     Units of different populations have the same names where they share a seed; here they get the population's before
     them, because other people drove. `event` is "KIND" for whom it was done to, "KIND, actor" for who did it, in the
@@ -55,6 +56,7 @@ def stress_windows(
             windows, labels = with_strata(windows, corpus, by)
             provenance |= labels
             windows = with_events(windows, corpus, future_s=spec.future_s)
+            windows = with_criticality(windows, corpus, future_s=spec.future_s)
             unit = pl.concat_str([pl.lit(population), pl.col("unit_id")], separator=":")
             tables.append(windows.with_columns(unit.alias("unit_id"), pl.lit(population).alias(POPULATION)))
     table = pl.concat(tables, how="diagonal")

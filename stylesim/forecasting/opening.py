@@ -37,7 +37,9 @@ def open_forecaster(
         return BASELINES[name]()
     if name == KinematicFan.name:
         if train is None:
-            raise InputError(f"{name} is fitted on a training split; this corpus has none")
+            raise InputError(
+                f"{name} is fitted on a training split; this corpus has none (`stress` takes one by --fit-on)"
+            )
         return KinematicFan().fit(train(), spec or WindowSpec())
     path = Path(name)
     if path.is_file():

@@ -3,35 +3,26 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 
-import numpy as np
-from matplotlib.figure import Figure
-
-from stylesim.corpus.files import write_whole
+from stylesim.corpus.files import json_bytes, write_whole
 from stylesim.errors import InputError
+from stylesim.evaluation.latency import Latency
 from stylesim.evaluation.metrics import METRICS
 from stylesim.evaluation.results import HEADINGS
-from stylesim.evaluation.stress import Coverage, Stress
-from stylesim.report.blocks import Block, Section, picture
+from stylesim.evaluation.stress_results import Stress
+from stylesim.report.blocks import Block, Section
 from stylesim.report.evaluate import file_names
-from stylesim.report.figures import WIDTH
 from stylesim.report.html import render
 from stylesim.report.sections import errors_section, warnings
-from stylesim.report.tables import EM, Cell, Table, estimate_cell, facts_table, number, size_text
-from stylesim.report.theme import SERIES_COLOUR, SERIES_MARKER, drawing, new_figure, plural
+from stylesim.report.stress_calibration import calibration_section
+from stylesim.report.stress_decisions import criticality_section, decisions_section
+from stylesim.report.stress_twins import latency_section, twins_section
+from stylesim.report.tables import Cell, Table, estimate_cell, facts_table, number, size_text
+from stylesim.report.theme import plural
 
-RELIABLE = (
-    "Each mode claims, with its probability, to be the one that ends nearest to the truth. Shown is how often claims "
-    "of about that probability came true; on the diagonal they mean what they say. ECE is the mean distance to it. A "
-    "forecaster of one mode has nothing to calibrate."
-)
-CONFORMAL = (
-    "Discs about the modes that hold 90 % of the final positions of the drivers they were calibrated on (half of the "
-    "episodes), and the share that they hold of others, by commanded style. Where everyday discs meet rare drivers, "
-    "less than 90 % is what a promise made on everyday traffic is worth."
-)
+LATENCY_FILE = "latency.json"
 DEGRADED = (
     "The same scenarios, seeds and events, driven by the everyday population and by one in which rare styles are "
     "common: rare_heavy minus naturalistic, above 0 is worse. Over all: every scenario weighs the same."
@@ -42,9 +33,10 @@ EVENTS = (
 )
 
 
-def save_stress(found: Sequence[Stress], page: str | Path) -> Path:
+def save_stress(found: Sequence[Stress], page: str | Path, *, latencies: Mapping[str, Latency] | None = None) -> Path:
     """Write the page (.html) and beside it each forecaster's .stress.json and evaluation; returns the page.
 
+    `latencies`, by forecaster, go into the page and into latency.json: they are of this machine and moment.
     InputError for another ending, or without a forecaster.
     """
     path = Path(page)
@@ -55,11 +47,14 @@ def save_stress(found: Sequence[Stress], page: str | Path) -> Path:
     evaluations = [one.evaluation for one in found]
     for one, name in zip(found, file_names(evaluations), strict=True):
         one.save(path.parent / name)
+    if latencies:
+        times = {name: one.to_dict() for name, one in latencies.items()}
+        write_whole(path.parent / LATENCY_FILE, json_bytes(times))
     about = found[0].evaluation.about
     sections = [
         errors_section(evaluations, seed=int(about["intervals"]["seed"])),
-        _worst_section(found), _events_section(found), _calibration_section(found),
-        *_twins_section(found), *_extra(found),
+        _worst_section(found), _events_section(found), *criticality_section(found), *decisions_section(found),
+        calibration_section(found), *twins_section(found), *latency_section(latencies or {}), *_extra(found),
     ]  # fmt: skip
     lead = (
         f"{plural(len(found), 'forecaster')}; {about['corpus']['scenes']} scenes of {about['corpus']['name']}; "
@@ -69,27 +64,6 @@ def save_stress(found: Sequence[Stress], page: str | Path) -> Path:
     html = render("Forecasts under stress", lead, sections, warnings(evaluations), [finding(one) for one in found])
     write_whole(path, html.encode())
     return path
-
-
-def _twins_section(found: Sequence[Stress]) -> list[Section]:
-    """One row per forecaster; no section without twins."""
-    rows = []
-    for one in found:
-        if one.twins is not None:
-            same = Cell(f"{one.twins.identical} of {one.twins.drivers}", look="number")
-            names = ("covers_own", "covers_twin", "covers_both", "apart_m")
-            rows.append(
-                (Cell(one.forecaster, look="head"), same, *(estimate_cell(one.twins.figures[n]) for n in names))
-            )
-    if not rows:
-        return []
-    heads = ("forecaster", "same forecast", "own future covered", "twin's covered", "both covered", "ends apart (m)")
-    table = Table("Drivers whose style was switched at t0", heads, tuple(rows))
-    text = (
-        "One past, two futures: at t0 the driver becomes another person. The histories are the same to the last bit, "
-        "so a forecaster that is not told the style must say the same. Covered: a mode ends within 2 m."
-    )
-    return [Section("twins", "Counterfactual twins", (text,), (Block(table=table),))]
 
 
 def _extra(found: Sequence[Stress]) -> list[Section]:
@@ -161,55 +135,3 @@ def _events_section(found: Sequence[Stress]) -> Section:
     heads = ("event", "forecaster", *(HEADINGS[metric] for metric in METRICS))
     table = Table("By event: mean over drivers, 95 % interval below", heads, tuple(rows))
     return Section("events", "When something happens", (EVENTS,), (Block(table=table),))
-
-
-def _calibration_section(found: Sequence[Stress]) -> Section:
-    blocks = picture(reliability_figure(found), "Bins with less than 0.1 % of the claims are not drawn.")
-    rows = []
-    for one in found:
-        rows += [
-            (Cell(one.forecaster, look="head"), Cell(each.group, size_text(each.error)),
-             estimate_cell(each.error, digits=3))
-            for each in one.reliability
-        ] or [(Cell(one.forecaster, look="head"), Cell("all"), Cell(EM, "one mode", "refused"))]  # fmt: skip
-    table = Table("Expected calibration error of mode probabilities", ("forecaster", "drivers", "ECE"), tuple(rows))
-    blocks.append(Block(table=table))
-    blocks += [Block(table=_coverage_table(one.forecaster, each)) for one in found for each in one.coverage]
-    return Section("calibration", "Does it know?", (RELIABLE, CONFORMAL), tuple(blocks))
-
-
-def _coverage_table(name: str, coverage: Coverage) -> Table:
-    rows = tuple(
-        (
-            Cell(one.group, size_text(one.pooled_coverage), "head"),
-            Cell(number(one.radius_m, 2) if np.isfinite(one.radius_m) else EM, "", "number"),
-            estimate_cell(one.coverage), estimate_cell(one.pooled_coverage),
-        )
-        for one in coverage.regions
-    )  # fmt: skip
-    caption = (
-        f"{name}: calibrated on {coverage.calibrated_on}, judged on {coverage.judged_on}; "
-        f"one radius for all is {coverage.pooled_radius_m:.2f} m"
-    )
-    return Table(caption, ("style", "own radius (m)", "coverage", "coverage, one radius for all"), rows)
-
-
-def reliability_figure(found: Sequence[Stress]) -> Figure | None:
-    """Claimed against came true, one line per forecaster; None where all have one mode."""
-    several = [(i, one.forecaster, one.reliability[0]) for i, one in enumerate(found) if one.reliability]
-    if not several:
-        return None
-    with drawing():
-        figure, (axes,) = new_figure(WIDTH * 0.6, 4.2)
-        axes.plot([0, 1], [0, 1], color="#8A949E", lw=1, ls="--")
-        for i, name, each in several:
-            shown = each.weight > 0.001
-            colour, marker = SERIES_COLOUR[i % len(SERIES_COLOUR)], SERIES_MARKER[i % len(SERIES_MARKER)]
-            axes.plot(each.claimed[shown], each.came_true[shown], lw=1.4, label=name, color=colour, marker=marker)
-        axes.set_xlabel("probability of the mode")
-        axes.set_ylabel("how often it ended nearest")
-        axes.set_xlim(0, 1)
-        axes.set_ylim(0, 1)
-        axes.set_title("Reliability of mode probabilities, all drivers")
-        axes.legend(loc="upper left")
-    return figure

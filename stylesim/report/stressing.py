@@ -8,8 +8,11 @@ from pathlib import Path
 
 from stylesim.corpus.files import new_folder
 from stylesim.errors import InputError
-from stylesim.evaluation.stress import Stress, stress
+from stylesim.evaluation.evaluate import common_spec
+from stylesim.evaluation.latency import latency
+from stylesim.evaluation.stress import stress
 from stylesim.evaluation.stress_corpora import StressTraffic
+from stylesim.evaluation.stress_results import Stress
 from stylesim.forecast import Forecaster
 from stylesim.report.stress_page import save_stress
 from stylesim.windows import WindowSpec
@@ -37,7 +40,11 @@ def run_stress(
         found = [
             stress(one, traffic, spec=spec, seed=seed, beside=forecasters, progress=progress) for one in forecasters
         ]
-        save_stress(found, partial / "report.html")
+        every = [corpus for corpora in traffic.populations.values() for corpus in corpora]
+        judged = common_spec(forecasters, spec or WindowSpec())
+        timed = {one.name: latency(one, every, spec=judged, beside=forecasters) for one in forecasters}
+        known = {name: one for name, one in timed.items() if one is not None}
+        save_stress(found, partial / "report.html", latencies=known)
         partial.rename(final)
     finally:
         shutil.rmtree(partial, ignore_errors=True)

@@ -13,7 +13,10 @@ def test_a_report_of_two_forecasters(stylesim, tmp_path):
     said = stylesim("stress", "constant_velocity", "lane_following", "--corpus", corpus, "--out", out)
     assert said.code == 0, said.err
     page = (out / "report.html").read_text()
-    assert all(word in page for word in ("Worst group", "Does it know?", "When something happens"))
+    assert all(word in page for word in ("Worst group", "Does it know?", "When something happens", "When it is close"))
+    times = json.loads((out / "latency.json").read_text())
+    assert set(times) == {"constant_velocity", "lane_following"}
+    assert times["lane_following"]["cpu_p95_ms"] > 0
     raw = json.loads((out / "lane_following.stress.json").read_text())
     assert raw["accuracy"]["slices"][0]["metrics"]["min_fde_m"]["n_drivers"] > 30
     said = stylesim("compare", out / "lane_following.json", out / "constant_velocity.json", "--by", "scenario")
@@ -32,3 +35,36 @@ def test_bad_input_leaves_nothing(stylesim, tmp_path):
     assert "different names" in twice.err
     assert not out.exists()
     assert not out.with_name("stress.partial").exists()
+
+
+def test_every_baseline_can_be_examined(stylesim, tmp_path):
+    """The fan is fitted on the train split; the test split is examined."""
+    corpus = write_corpus(tmp_path / "corpus", 60)
+    names = ["constant_velocity", "constant_turn_rate", "lane_following", "idm_rollout", "kinematic_fan"]
+    said = stylesim("stress", *names, "--corpus", corpus, "--split", "test", "--out", tmp_path / "stress")
+    assert said.code == 0, said.err
+    found = json.loads((tmp_path / "stress" / "kinematic_fan.stress.json").read_text())
+    assert found["accuracy"]["about"]["corpus"]["splits"] == {"test": 10}
+
+
+def test_a_fan_is_not_fitted_on_what_it_is_examined_on(stylesim, tmp_path):
+    bare = write_corpus(tmp_path / "bare", 24, splits=False)
+    ask = ("stress", "kinematic_fan", "--corpus", bare, "--out", tmp_path / "stress")
+    said = stylesim(*ask)
+    assert said.code == 2
+    assert "--fit-on" in said.err
+    assert "one corpus" in stylesim(*ask, "--fit-on", bare).err
+    other = write_corpus(tmp_path / "other", 12)
+    assert stylesim(*ask, "--fit-on", other).code == 0
+
+
+def test_the_same_examination_has_the_same_bytes(stylesim, tmp_path):
+    corpus = write_corpus(tmp_path / "corpus", 12)
+    for name in ("one", "two"):
+        assert stylesim("stress", "lane_following", "--corpus", corpus, "--out", tmp_path / name).code == 0
+    made = sorted(
+        path.name for path in (tmp_path / "one").iterdir() if path.name not in ("latency.json", "report.html")
+    )
+    assert "lane_following.stress.json" in made
+    for name in made:
+        assert (tmp_path / "one" / name).read_bytes() == (tmp_path / "two" / name).read_bytes(), name

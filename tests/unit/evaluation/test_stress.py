@@ -9,10 +9,10 @@ import pytest
 from stylesim.errors import InputError
 from stylesim.evaluation.evaluate import evaluate
 from stylesim.evaluation.reliability import reliability
-from stylesim.evaluation.stress import load_stress, stress
+from stylesim.evaluation.stress import stress
 from stylesim.evaluation.stress_corpora import EVERYDAY, RARE, StressTraffic, own_traffic
 from stylesim.evaluation.stress_groups import degradation, worst_group
-from stylesim.evaluation.stress_twins import twin_forecasts
+from stylesim.evaluation.stress_results import load_stress
 from stylesim.evaluation.stress_windows import CAUSED, NO_EVENT, with_events
 
 
@@ -97,9 +97,10 @@ def test_other_draws_of_the_same_world_are_no_degradation(world, paired):
     found = stress(world.ConstantVelocity(), paired)
     change = found.degradation[0].change["min_fde_m"]
     assert change.low < 0 < change.high
-    assert [(one.calibrated_on, one.judged_on) for one in found.coverage] == [
-        (EVERYDAY, EVERYDAY), (RARE, RARE), (EVERYDAY, RARE),
-    ]  # fmt: skip
+    sides = [(EVERYDAY, EVERYDAY), (RARE, RARE), (EVERYDAY, RARE)]
+    assert [(one.by, one.calibrated_on, one.judged_on) for one in found.coverage] == [
+        (by, *side) for side in sides for by in ("commanded", "commanded*scenario")
+    ]
     assert all(0.8 < one.regions[0].pooled_coverage.value <= 1.0 for one in found.coverage)
     assert found.reliability == ()  # one mode
 
@@ -142,48 +143,9 @@ def test_windows_see_the_event_and_who_caused_it_is_apart(world, tmp_path):
 def test_saved_and_loaded(found, tmp_path):
     path = found.save(tmp_path / "mine")
     assert load_stress(path) == json.loads(json.dumps(found.to_dict()))
-    assert {one.name for one in tmp_path.iterdir()} == {"mine.json", "mine.md", "mine.parquet", "mine.stress.json"}
+    made = {one.name for one in tmp_path.iterdir()}
+    assert made == {"mine.json", "mine.md", "mine.parquet", "mine.stress.json", "mine.decisions.parquet"}
     with pytest.raises(InputError, match="no stress test"):
         load_stress(tmp_path / "mine.json")
     with pytest.raises(InputError, match="no such file"):
         load_stress(tmp_path / "other.json")
-
-
-def test_twins_share_a_past_and_part_after_it(world, tmp_path):
-    from dataclasses import replace
-
-    from stylesim.windows import WindowSpec
-
-    scenes, t0 = [], 60
-    for e in range(36):
-        plain = world.scene(e)
-        moved = plain.tracks.position_m.copy()
-        moved[2, t0 + 1 :, 0] -= 2.0 * np.arange(1, plain.tracks.n_frames - t0)[:] * 0.1  # 12 m behind after 6 s
-        about = {"driver": "car2", "at_s": 6.0, "variant": "twin"}
-        twin = replace(
-            plain,
-            scene_id=f"{plain.scene_id}-twin",
-            twin_of=plain.scene_id,
-            tracks=replace(plain.tracks, position_m=moved),
-            metadata={"twin": about},
-        )
-        scenes += [plain, twin]
-    corpus = world.write(tmp_path / "twins", scenes, with_labels=False)
-    traffic = own_traffic(corpus)
-    assert len(traffic.populations[corpus.path.name][0]) == 36
-    ask = {"spec": WindowSpec(), "modes": 6, "seed": 0}
-    blind = twin_forecasts(
-        world.ConstantVelocity(tuple(np.linspace(0.4, 1.6, 61))), traffic.twins, **ask | {"modes": 61}
-    )
-    assert (blind.drivers, blind.identical) == (36, 36)
-    assert blind.figures["apart_m"].value == pytest.approx(12.0, abs=1e-3)
-    assert blind.figures["covers_both"].value == 1.0
-    one_mode = twin_forecasts(world.ConstantVelocity(), traffic.twins, **ask)
-    assert one_mode.figures["covers_both"].value == 0.0
-
-    class Peeping(world.ConstantVelocity):
-        def _one(self, task):
-            given = super()._one(task)
-            return replace(given, mode_m=given.mode_m + np.float32(task.scene.scene_id.endswith("twin")))
-
-    assert twin_forecasts(Peeping(), traffic.twins, **ask).identical == 0
