@@ -15,7 +15,8 @@ network, so that they may know what a forecaster must not.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
+from typing import Any
 
 from stylesim.errors import InputError, unknown
 
@@ -63,6 +64,10 @@ class RobustSettings:
         names = asked.split(",") if isinstance(asked, str) else asked
         methods = tuple(name.strip() for name in names if name.strip() not in ("", "none"))
         return cls(methods)
+
+    def to_dict(self) -> dict[str, Any]:
+        """As plain JSON types."""
+        return {**asdict(self), "methods": list(self.methods)}
 
     @property
     def grouped(self) -> bool:

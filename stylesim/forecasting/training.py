@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import shutil
 from collections.abc import Callable, Sequence
 from dataclasses import asdict, dataclass
@@ -13,9 +12,9 @@ import torch
 
 from stylesim.corpus import Corpus
 from stylesim.errors import InputError, unknown
-from stylesim.forecasting.augmenting import added_view
+from stylesim.forecasting.augmenting import Added, added_view
 from stylesim.forecasting.checkpoint import MODEL_FILE, RECORD_FILE, load, save
-from stylesim.forecasting.conditioner import Judges
+from stylesim.forecasting.conditioner import Judges, StyleConditioner
 from stylesim.forecasting.conditions import CONDITIONS, model_name
 from stylesim.forecasting.config import VIEWS, InputConfig, ModelConfig, model_config
 from stylesim.forecasting.devices import runtime
@@ -88,33 +87,18 @@ def train(
     robust = RobustSettings.of(robust)
     added = None if augment is None else added_view(corpus, augment, augment_share)
     out = Path(out)
-    record = {
-        "corpus": corpus.fingerprint,
-        "condition": condition,
-        "size": size,
-        "spec": asdict(spec),
-        "settings": asdict(settings),
-        "fusion": fusion,
-        "reading": reading,
-        "style_dropout": style_dropout,
-        "robust": json.loads(json.dumps(asdict(robust))),
-        "augment": None if added is None else added.to_dict(),
-    }
+    record: dict[str, Any] = {"corpus": corpus.fingerprint, "condition": condition, "size": size, "fusion": fusion}
+    record |= {"reading": reading, "style_dropout": style_dropout, "spec": asdict(spec), "settings": asdict(settings)}
+    record |= {"robust": robust.to_dict(), "augment": None if added is None else added.to_dict()}
     if resume and (out / MODEL_FILE).exists():
         check_same(record, out)
         return load(out)
     folder = opened(out, record, resume=resume)
     watch = _Watch(stage, progress)
-    corpora = [corpus] if added is None else [corpus, added.corpus]
-    stores = [
-        compiled(c, spec, inputs, cache or cache_dir(), progress=watch.begin("compiling samples")) for c in corpora
-    ]
-    conditioner, parts = styled_data(corpora, condition, spec, stores, inputs, judges, seed=seed, begin=watch.begin)
-    data: TrainingSet = parts[0] if added is None else MixedData(parts[0], parts[1], added.share)
+    conditioner, data, groups = _training_set(
+        corpus, added, condition, spec, inputs, judges, robust, seed=seed, cache=cache or cache_dir(), watch=watch
+    )
     config = with_styles(config, conditioner)
-    groups: tuple[str, ...] = ()
-    if robust.grouped:
-        data, groups = with_groups(data, corpora, robust)
     place = runtime(accelerator)
     if "jtt" in robust.methods:
         first, told = _network(config, data, seed), watch.begin("identifying what is hard")
@@ -129,6 +113,29 @@ def train(
     _close(folder, out)
     forecaster.training_curve = tuple(loop.curve)
     return forecaster
+
+
+def _training_set(
+    corpus: Corpus,
+    added: Added | None,
+    condition: str,
+    spec: WindowSpec,
+    inputs: InputConfig,
+    judges: Judges | None,
+    robust: RobustSettings,
+    *,
+    seed: int,
+    cache: Path,
+    watch: _Watch,
+) -> tuple[StyleConditioner | None, TrainingSet, tuple[str, ...]]:
+    """What is fitted on the training split, all samples with their style, and the names of their groups."""
+    corpora = [corpus] if added is None else [corpus, added.corpus]
+    stores = [compiled(c, spec, inputs, cache, progress=watch.begin("compiling samples")) for c in corpora]
+    conditioner, parts = styled_data(corpora, condition, spec, stores, inputs, judges, seed=seed, begin=watch.begin)
+    data: TrainingSet = parts[0] if added is None else MixedData(parts[0], parts[1], added.share)
+    if not robust.grouped:
+        return conditioner, data, ()
+    return conditioner, *with_groups(data, corpora, robust)
 
 
 def _network(config: ModelConfig, data: TrainingSet, seed: int) -> ForecastNetwork:
