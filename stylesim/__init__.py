@@ -45,6 +45,7 @@ _HOME = {
     "merge": "stylesim.merging.merge",
     "own_network": "stylesim.simulation.sumo.own",
     "populate": "stylesim.plugins.populate",
+    "predict": "stylesim.forecasting.predicting",
     "read": "stylesim.datasets.reading",
     "realism": "stylesim.evaluation.realism",
     "train": "stylesim.forecasting.training",

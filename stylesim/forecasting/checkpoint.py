@@ -21,6 +21,7 @@ from stylesim.forecasting.conditions import condition_of
 from stylesim.forecasting.config import ModelConfig
 from stylesim.forecasting.forecaster import TrainedForecaster
 from stylesim.forecasting.model import ForecastNetwork
+from stylesim.forecasting.posterior import StylePosterior
 
 RECORD_FILE = "training.json"  # settings, corpus and loss curve, for the report
 MODEL_FILE = "model.pt"
@@ -112,4 +113,6 @@ def conditioner_from_dict(raw: Mapping[str, Any] | None) -> StyleConditioner | N
 
     judges = LabelerJudges.from_dict(raw["judges"])
     form = FORMS[condition_of(raw["condition"]).form]
-    return StyleConditioner(raw["condition"], judges, form.from_dict(raw["cells"]))
+    learned = raw.get("posterior")  # absent from models of the first format
+    posterior = None if learned is None else StylePosterior.from_dict(learned)
+    return StyleConditioner(raw["condition"], judges, form.from_dict(raw["cells"]), posterior)

@@ -7,12 +7,13 @@ from dataclasses import dataclass
 from typing import Any, Protocol, runtime_checkable
 
 import numpy as np
-from jaxtyping import Float32, Int32, Int64
+from jaxtyping import Float32, Float64, Int32, Int64
 
 from stylesim.errors import InputError
 from stylesim.forecasting.conditioning import StyleCells
 from stylesim.forecasting.conditions import EARLIER_S, Condition, condition_of
 from stylesim.forecasting.measured import Measured
+from stylesim.forecasting.posterior import StylePosterior
 from stylesim.forecasting.random_cells import RandomCells
 from stylesim.forecasting.samples import SPLITS, Window
 from stylesim.forecasting.truth import Truth
@@ -52,6 +53,7 @@ class StyleConditioner:
     condition: str
     judges: Judges
     cells: StyleCells | StyleVectors | RandomCells
+    posterior: StylePosterior | None = None
 
     @property
     def kind(self) -> Condition:
@@ -84,7 +86,7 @@ class StyleConditioner:
         """
         seen = measured(self.kind, self.judges, history, agent_index, earlier=earlier)
         if style is not None:
-            return self._what_if.assign(seen, style=self._what_if.class_index(style))
+            return self.what_if(seen, style)
         if self.kind.sees_future:
             if truth is None:
                 raise InputError("an oracle must be told the true styles")
@@ -92,6 +94,25 @@ class StyleConditioner:
         if isinstance(self.cells, RandomCells):
             return self.cells.draw(driver_names(history, agent_index))
         return self.cells.assign(seen)
+
+    def what_if(self, seen: Measured, style: str) -> StyleCond:
+        """As if each of the drivers were of that class; InputError for an unknown one."""
+        return self._what_if.assign(seen, style=self._what_if.class_index(style))
+
+    def what_ifs(
+        self, history: Scene, agent_index: Int32[np.ndarray, " driver"], *, earlier: Scene | None = None
+    ) -> tuple[list[StyleCond], Float64[np.ndarray, "driver style"]]:
+        """For every class, as if each driver were of it; and how likely that is, given the history.
+
+        InputError where no posterior was learned (the judges gave no features, or no whole track had a class).
+        """
+        if self.posterior is None:
+            raise InputError(
+                "this model has no posterior of styles to average over: no whole track of its training had a style, "
+                "or its judges give no features"
+            )
+        seen = measured(self.kind, self.judges, history, agent_index, earlier=earlier)
+        return [self.what_if(seen, name) for name in self.classes], self.posterior.of(seen)
 
     @property
     def _what_if(self) -> StyleCells | StyleVectors:
@@ -103,7 +124,12 @@ class StyleConditioner:
 
     def to_dict(self) -> dict[str, Any]:
         """As plain JSON types."""
-        return {"condition": self.condition, "judges": dict(self.judges.to_dict()), "cells": self.cells.to_dict()}
+        return {
+            "condition": self.condition,
+            "judges": dict(self.judges.to_dict()),
+            "cells": self.cells.to_dict(),
+            "posterior": None if self.posterior is None else self.posterior.to_dict(),
+        }
 
 
 FORMS: dict[str, type[StyleCells] | type[StyleVectors] | type[RandomCells]] = {
@@ -145,19 +171,26 @@ def fit_conditioner(
     The windows come in the order of the sample store; those of other splits are judged, never fitted on.
     """
     kind = condition_of(condition)
-    truth = Truth(judges, judges.classes, commanded=True) if kind.sees_future else None
+    truth = Truth(judges, judges.classes, commanded=kind.sees_future)
     earlier_s = EARLIER_S if kind.span == "earlier" else 0.0
     parts: list[Measured] = []
-    is_train, drivers = [], []
+    is_train, drivers, target = [], [], []
     for window in sample_windows:
         before = earlier_scene(window.scene, window.t0, window.history.tracks.n_frames, earlier_s)
         part = measured(kind, judges, window.history, window.targets, earlier=before)
-        parts.append(part if truth is None else part.with_style(truth.of_scene(window.scene)[window.targets]))
-        is_train.append(np.full(len(window.targets), window.split == SPLITS[0]))
+        learns = window.split == SPLITS[0]
+        if learns or kind.sees_future:
+            true_style = truth.of_scene(window.scene)[window.targets]
+            target.append(true_style if learns else np.zeros(0, np.int64))
+        parts.append(part.with_style(true_style) if kind.sees_future else part)
+        is_train.append(np.full(len(window.targets), learns))
         drivers += driver_names(window.history, window.targets)
-    every = Measured.joined(parts)
-    cells, style = _encoded(kind, every, np.concatenate([np.zeros(0, bool), *is_train]), drivers, judges.classes, seed)
-    return StyleConditioner(condition, judges, cells), style
+    every, training = Measured.joined(parts), np.concatenate([np.zeros(0, bool), *is_train])
+    cells, style = _encoded(kind, every, training, drivers, judges.classes, seed)
+    rng = stream(seed, 0, "", "style posterior")
+    known = np.concatenate([np.zeros(0, np.int64), *target])
+    posterior = StylePosterior.fit(every.rows(training), known, judges.classes, rng=rng)
+    return StyleConditioner(condition, judges, cells, posterior), style
 
 
 def _encoded(

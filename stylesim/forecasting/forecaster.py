@@ -8,12 +8,13 @@ import numpy as np
 import torch
 from jaxtyping import Float32
 
-from stylesim.errors import InputError
+from stylesim.errors import InputError, unknown
 from stylesim.forecast import Forecast, ForecastTask
 from stylesim.forecasting.batching import gather, to_scene
 from stylesim.forecasting.conditioner import StyleCond, StyleConditioner
 from stylesim.forecasting.conditioning import NULL
 from stylesim.forecasting.config import ModelConfig
+from stylesim.forecasting.marginal import MARGINAL, averaged
 from stylesim.forecasting.model import ForecastNetwork
 from stylesim.forecasting.samples import RoadCutter, add_window
 from stylesim.forecasting.store import MemorySink, SampleStore, StoreBuilder
@@ -78,11 +79,14 @@ class TrainedForecaster:
         """Modes for every task, in the frame of its scene.
 
         The style comes from each driver's history. `style` overrides it: the name of a class asks what everyone
-        would do if he were of that class, "none" asks without any style. InputError for tasks of another time
-        step, a longer future than the model was trained for, or an agent that is not known at t0.
+        would do if he were of that class, "none" asks without any style, and "marginal" averages over the classes,
+        each as likely as the history says. InputError for tasks of another time step, a longer future than the model
+        was trained for, an agent that is not known at t0, or a style that the model does not know.
         """
         for task in tasks:
             self._check(task)
+        if self.known_style(style) == MARGINAL:
+            return self._marginal(tasks)
         return self.predict_given(tasks, [self.style_cond(task, style) for task in tasks])
 
     def style_cond(self, task: ForecastTask, style: str | None = None) -> StyleCond:
@@ -90,9 +94,8 @@ class TrainedForecaster:
 
         InputError for a style that the model does not know, and for an oracle that has not been told the truth.
         """
+        self.known_style(style)
         if self.conditioner is None:
-            if style not in (None, NO_STYLE):
-                raise InputError(f"{self.name} was trained without style; it cannot answer style={style!r}")
             return np.full((len(task.agent_index), 3), NULL, np.int64)
         if style == NO_STYLE:
             assert self.network.style is not None
@@ -101,6 +104,26 @@ class TrainedForecaster:
         if self.sees_future and style is None:
             truth = looked_up(self._truth, task.scene, task.agent_index)
         return self.conditioner.style_cond(task.scene, task.agent_index, style=style, earlier=task.earlier, truth=truth)
+
+    def known_style(self, style: str | None) -> str | None:
+        """`style`, where `predict` can be asked with it; InputError where not."""
+        if style in (None, NO_STYLE):
+            return style
+        if self.conditioner is None:
+            raise InputError(f"{self.name} was trained without style; it cannot answer style={style!r}")
+        if style not in (*self.styles, MARGINAL):
+            raise unknown("style", str(style), (*self.styles, NO_STYLE, MARGINAL))
+        return style
+
+    def _marginal(self, tasks: Sequence[ForecastTask]) -> list[Forecast]:
+        assert self.conditioner is not None
+        asked = [self.conditioner.what_ifs(t.scene, t.agent_index, earlier=t.earlier) for t in tasks]
+        by_style = [self.predict_given(tasks, [cond[z] for cond, _ in asked]) for z in range(len(self.styles))]
+        count, apart_m = self.config.modes, self.config.nms_m
+        return [
+            averaged([answers[i] for answers in by_style], weight, count=count, apart_m=apart_m)
+            for i, (_, weight) in enumerate(asked)
+        ]
 
     def predict_given(self, tasks: Sequence[ForecastTask], cond: Sequence[StyleCond]) -> list[Forecast]:
         """As `predict`, the style being what `cond` says of the drivers of each task (rows as of `style_cond`)."""

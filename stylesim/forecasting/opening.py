@@ -21,6 +21,7 @@ BASELINES: dict[str, Callable[[], Forecaster]] = {
     IdmRollout.name: IdmRollout,
 }
 AV2_SUFFIX = ".parquet"
+AT = "@"  # FOLDER@STYLE
 WAYMO_SUFFIXES = (".binproto", ".bin", ".pb", ".gz", ".tar", ".tgz")
 
 
@@ -29,7 +30,8 @@ def open_forecaster(
 ) -> Forecaster:
     """The forecaster that `name` means.
 
-    A baseline's name; the folder of a trained model; `pkg.module:factory`; a model file (.pt, .pt2, .onnx with a JSON
+    A baseline's name; the folder of a trained model, or FOLDER@STYLE to ask it always with that style (a class, "none"
+    or "marginal"); `pkg.module:factory`; a model file (.pt, .pt2, .onnx with a JSON
     beside it); predictions made elsewhere (Argoverse 2 .parquet; Waymo .binproto or .tar.gz). `kinematic_fan` is fitted
     on the scenes that `train` gives. InputError if it is none of them.
     """
@@ -42,6 +44,8 @@ def open_forecaster(
             )
         return KinematicFan().fit(train(), spec or WindowSpec())
     path = Path(name)
+    if AT in name and not path.exists():
+        return _as_style(name)
     if path.is_file():
         return _from_file(path)
     if path.is_dir():
@@ -51,6 +55,17 @@ def open_forecaster(
     if is_entry_point(name):
         return from_entry_point(name)
     raise unknown("forecaster", name, [*BASELINES, KinematicFan.name], where="baselines, files, folders, entry points")
+
+
+def _as_style(name: str) -> Forecaster:
+    """A trained model that is asked with one style: runs/model@timid."""
+    folder, _, style = name.rpartition(AT)
+    if not Path(folder).exists():
+        raise InputError(f"no such model: {folder} (of {name}, which asks it with the style {style!r})")
+    from stylesim.forecasting.checkpoint import load
+    from stylesim.forecasting.marginal import AsStyle
+
+    return AsStyle(load(folder), style)
 
 
 def _from_file(path: Path) -> Forecaster:

@@ -20,8 +20,10 @@ from stylesim.forecasting.conditioner import StyleConditioner, fit_conditioner
 from stylesim.forecasting.conditions import CONDITIONS, EARLIER_S, SEES_FUTURE, TABLE
 from stylesim.forecasting.config import READINGS, model_config
 from stylesim.forecasting.judging import LabelerJudges
+from stylesim.forecasting.marginal import MARGINAL
 from stylesim.forecasting.measured import Measured
 from stylesim.forecasting.model import ForecastNetwork
+from stylesim.forecasting.opening import open_forecaster
 from stylesim.forecasting.samples import windows
 from stylesim.forecasting.style_vector import style_parameters
 from stylesim.forecasting.training import train
@@ -222,6 +224,21 @@ def test_an_oracle_says_so_and_must_be_told(models: Path, corpus: Corpus) -> Non
             assert oracle.styles[z] == driver.name
     judged = evaluate(load(models / "oracle"), corpus.split("val"), by=("scenario",), spec=SPEC)
     assert SEES_FUTURE in judged.forecaster
+
+
+@pytest.mark.parametrize("name", TABLE)
+def test_every_model_can_average_over_styles_and_the_oracle_is_honest_then(name: str, models: Path) -> None:
+    model = open_forecaster(f"{models / name}@{MARGINAL}")
+    assert model.name == f"tiny-{name}-early@{MARGINAL}"  # without the oracle's mark
+    scene = make_scene(seed=53, n_agents=8, n_frames=140)
+    answers = []
+    for one in (scene, without_future(scene)):
+        agents = target_agents(one, T0, SPEC, need_future=False)
+        task = ForecastTask(one.history(T0, STEPS), agents, 30, T0, earlier_scene(one, T0, STEPS, EARLIER_S))
+        answers.append(model.predict([task])[0])
+    assert answers[0].mode_m.tobytes() == answers[1].mode_m.tobytes()
+    assert answers[0].probability.tobytes() == answers[1].probability.tobytes()
+    np.testing.assert_allclose(answers[0].probability.sum(axis=1), 1.0, atol=1e-5)
 
 
 def test_condition_names_are_checked_before_any_work(corpus: Corpus, tmp_path: Path) -> None:
