@@ -9,7 +9,7 @@ trap 'rm -rf "$work"' EXIT
 "$(readlink -f .venv/bin/python)" -m venv "$work/env"
 # shellcheck disable=SC2086
 "$work/env/bin/pip" install --quiet --disable-pip-version-check ${PIP_ARGS:-} -c constraints.txt \
-  "$(ls "$work"/*.whl)[all]" nbclient ipykernel nbformat
+  "$(ls "$work"/*.whl)[all,tutorial]" nbclient ipykernel nbformat
 mkdir "$work/run" && cp -r data "$work/run/data"
 cd "$work/run"
 for notebook in "$root"/notebooks/*.ipynb; do

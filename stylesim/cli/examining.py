@@ -3,38 +3,81 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import typer
 
 from stylesim.cli.console import progress_bar, say, show_table
 from stylesim.errors import InputError
 
+if TYPE_CHECKING:
+    from stylesim.evaluation.comparison import Comparison
+    from stylesim.evaluation.intervals import Estimate
+
 
 def compare(
-    ours: Path = typer.Argument(help="An evaluation's .json (in the folder that `evaluate` made)."),
+    ours: Path = typer.Argument(help="An evaluation's .json, or a stress test's .stress.json (in the folder it made)."),
     theirs: Path = typer.Argument(help="Another one's, of the same corpus and windows."),
     by: str | None = typer.Option(None, help="One stratum only; all that both have, without it."),
     seed: int = typer.Option(0, min=0, help="Of the bootstrap."),
+    out: Path | None = typer.Option(None, "--out", help="Write every figure as JSON to this file."),
+    report: Path | None = typer.Option(None, "--report", help="Write an HTML page with figures to this file."),
 ) -> None:
     """Paired differences of two forecasters on the same windows, with 95 % intervals; below 0 the first is better."""
-    from stylesim.evaluation.compare import differences
-    from stylesim.evaluation.results import HEADINGS, interval_text, load_evaluation
-    from stylesim.evaluation.slices import ALL
+    from stylesim.corpus.files import json_bytes, write_whole
+    from stylesim.evaluation.comparison import compare as run
 
-    a, b = load_evaluation(ours), load_evaluation(theirs)
-    shared = [name for name in a.by if name in b.by]
-    if by is not None and by not in shared:
-        raise InputError(f"--by: {by!r} is not in both evaluations; they share {', '.join(shared) or 'none'}")
-    for stratum in (ALL, *(shared if by is None else [by])):
-        cells = differences(a, b, stratum, seed=seed)
+    if out is not None and out.suffix != ".json":
+        raise InputError(f"--out {out}: figures are written as .json")
+    if report is not None and report.suffix != ".html":
+        raise InputError(f"--report {report}: a report is an .html file")
+    found = run(ours, theirs, by=by, seed=seed)
+    show_comparison(found)
+    if out is not None:
+        write_whole(out, json_bytes(found.to_dict()))
+        say(f"{out}")
+    if report is not None:
+        from stylesim.report.compare_page import save_comparison
+
+        say(f"{save_comparison(found, report)}")
+
+
+def show_comparison(found: Comparison) -> None:
+    """Every table on stdout."""
+    from stylesim.evaluation.results import HEADINGS, interval_text
+    from stylesim.evaluation.slices import ALL
+    from stylesim.evaluation.stress_decisions import MEASURES
+
+    names = f"{found.ours.forecaster} minus {found.theirs.forecaster}"
+
+    def tell(title: str, by: str, cells: Mapping[str, Mapping[str, Estimate]], columns: Mapping[str, str]) -> None:
         rows = []
         for value, metrics in cells.items():
             size = next(iter(metrics.values()))
-            numbers = [interval_text(metrics[name]) for name in HEADINGS]
-            rows.append((value, f"{size.n_drivers} / {size.n_units}", *numbers))
-        heads = (stratum, "drivers / units", *HEADINGS.values())
-        show_table(f"{a.forecaster} minus {b.forecaster}, by {stratum}", heads, rows)
+            rows.append(
+                (value, f"{size.n_drivers} / {size.n_units}", *(interval_text(metrics[name]) for name in columns))
+            )
+        show_table(title, (by, "drivers / units", *columns.values()), rows)
+
+    for by, cells in found.cells.items():
+        tell(f"{names}, by {by}", by, cells, HEADINGS)
+    for (kind, by), cells in found.decisions.items():
+        if by in (ALL, "taken"):
+            tell(f"{names}: {kind}, by {by}", by, cells, {name: name for name in MEASURES})
+    if found.figures:
+        rows = [
+            (
+                one.group,
+                one.name,
+                *("–" if side is None else interval_text(side, digits=3) for side in (one.ours, one.theirs)),
+            )
+            for one in found.figures
+        ]
+        show_table(
+            "Beside each other, not paired", ("", "figure", found.ours.forecaster, found.theirs.forecaster), rows
+        )
 
 
 def conformal(
@@ -88,7 +131,9 @@ def conformal(
 def add_to(app: typer.Typer) -> None:
     """Register the verbs."""
     app.command(
-        "compare", epilog="Example: `stylesim compare runs/report/mine.json runs/report/constant_velocity.json`"
+        "compare",
+        epilog="Example: `stylesim compare runs/stress/mine.stress.json runs/stress/constant_velocity.stress.json "
+        "--report runs/compare.html`",
     )(compare)
     app.command("conformal", epilog="Example: `stylesim conformal runs/model runs/mixed --by history:tdbm*scenario`")(
         conformal

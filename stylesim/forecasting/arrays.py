@@ -13,20 +13,22 @@ The adapter owns units, rate and frame, so that nobody's model has to be changed
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from typing import Any
 
 import numpy as np
-from jaxtyping import Float64
+from jaxtyping import Float32, Float64
 
 from stylesim.errors import InputError
 from stylesim.forecast import Forecast, ForecastTask
-from stylesim.forecasting.batching import Batch, gather, to_scene
+from stylesim.forecasting.batching import Batch, gather, to_scene, to_target
 from stylesim.forecasting.config import InputConfig
 from stylesim.forecasting.rates import history_at, path_at
 from stylesim.forecasting.samples import RoadCutter, add_window
 from stylesim.forecasting.store import MemorySink, StoreBuilder
+from stylesim.scene import Scene
+from stylesim.windows import WindowSpec, anchor_frames, target_agents
 
 FOOT_M = 0.3048  # the international foot
 LARGEST_JUMP_M = 50.0  # chosen: no first step lies so far away; a forecast in another frame or unit does
@@ -82,6 +84,30 @@ class ArrayForecaster:
     def predict(self, tasks: Sequence[ForecastTask]) -> list[Forecast]:
         """Modes for every task in the frame, unit and rate of its scene."""
         return [self._one(task) for task in tasks]
+
+    def examples(
+        self, scenes: Iterable[Scene], *, stride_s: float = 3.0
+    ) -> Iterator[tuple[dict[str, np.ndarray], Float32[np.ndarray, "driver step 2"]]]:
+        """(what the model is given, what it should say) of every t0 of the scenes: to train it on what it will see.
+
+        The future is in the driver's frame at t0, in the model's rate and unit, like its answer; all drivers of a t0
+        are one batch. Scenes too short for a window give none.
+        """
+        inputs = self._inputs
+        spec = WindowSpec(inputs.history_steps * inputs.dt_s, inputs.future_steps * inputs.dt_s, stride_s)
+        for scene in scenes:
+            tracks, (history, future, _) = scene.tracks, spec.steps(scene.tracks.dt_s)
+            for t0 in anchor_frames(scene, spec):
+                drivers = target_agents(scene, t0, spec)
+                if not len(drivers):
+                    continue
+                batch = self._batch(ForecastTask(scene.history(t0, history), drivers, future, t0))
+                truth = path_at(
+                    tracks.position_m[drivers, t0 + 1 : t0 + 1 + future][:, None], batch.pose[:, :2],
+                    dt_s=tracks.dt_s, wanted_dt_s=inputs.dt_s, steps=inputs.future_steps,
+                )[:, 0]  # fmt: skip
+                answer = to_target(truth - batch.pose[:, None, :2], batch.pose[:, 2]) / self._unit_m
+                yield model_inputs(batch, self._unit_m), answer.astype(np.float32)
 
     def _one(self, task: ForecastTask) -> Forecast:
         tracks = task.scene.tracks

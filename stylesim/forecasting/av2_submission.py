@@ -15,6 +15,7 @@ from stylesim.forecasting.predictions import ANY_T0, Key, PredictionFile, collec
 DT_S = 0.1  # Argoverse 2: 60 points at 10 Hz, the first 0.1 s after t0
 COLUMNS = ("scenario_id", "track_id", "probability", "predicted_trajectory_x", "predicted_trajectory_y")
 T0_COLUMN = "t0_frame"  # ours, for corpora whose scenes have more than one t0
+DT_COLUMN, UNIT_COLUMN = "dt_s", "unit_m"  # ours, for predictions at another rate, or in feet (0.3048); one per file
 
 
 def av2_predictions(path: Path) -> PredictionFile:
@@ -28,10 +29,21 @@ def av2_predictions(path: Path) -> PredictionFile:
             raise InputError(f"{path}: the column {column!r} is missing; an Argoverse 2 submission has {COLUMNS}")
     if table.null_count().sum_horizontal().sum():
         raise InputError(f"{path}: some cells are empty")
-    return PredictionFile(path.stem, collected(_rows(table, path), where=str(path)), dt_s=DT_S)
+    dt_s, unit_m = _one_number(table, path, DT_COLUMN, DT_S), _one_number(table, path, UNIT_COLUMN, 1.0)
+    return PredictionFile(path.stem, collected(_rows(table, path, unit_m), where=str(path)), dt_s=dt_s)
 
 
-def _rows(table: pl.DataFrame, path: Path) -> Iterator[tuple[Key, Float64[np.ndarray, "step 2"], float]]:
+def _one_number(table: pl.DataFrame, path: Path, column: str, usual: float) -> float:
+    """The number that a column of ours holds in every row; `usual` without the column."""
+    if column not in table.columns:
+        return usual
+    values = table[column].unique().to_list()
+    if len(values) != 1 or not isinstance(values[0], int | float) or not 0 < values[0] < np.inf:
+        raise InputError(f"{path}: the column {column!r} must hold one positive number, the same in every row")
+    return float(values[0])
+
+
+def _rows(table: pl.DataFrame, path: Path, unit_m: float) -> Iterator[tuple[Key, Float64[np.ndarray, "step 2"], float]]:
     has_t0 = T0_COLUMN in table.columns
     for row in table.iter_rows(named=True):
         try:
@@ -43,4 +55,4 @@ def _rows(table: pl.DataFrame, path: Path) -> Iterator[tuple[Key, Float64[np.nda
             raise InputError(f"{path}: scenario {row['scenario_id']!r}: {error}") from None
         if x.ndim != 1 or x.shape != y.shape:
             raise InputError(f"{path}: scenario {row['scenario_id']!r}: x and y differ in length")
-        yield (str(row["scenario_id"]), str(row["track_id"]), t0), np.stack([x, y], axis=1), chance
+        yield (str(row["scenario_id"]), str(row["track_id"]), t0), np.stack([x, y], axis=1) * unit_m, chance

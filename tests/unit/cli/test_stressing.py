@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import json
 
+import pytest
+
 from tests.unit.cli.conftest import write_corpus
 
 
@@ -19,8 +21,21 @@ def test_a_report_of_two_forecasters(stylesim, tmp_path):
     assert times["lane_following"]["cpu_p95_ms"] > 0
     raw = json.loads((out / "lane_following.stress.json").read_text())
     assert raw["accuracy"]["slices"][0]["metrics"]["min_fde_m"]["n_drivers"] > 30
-    said = stylesim("compare", out / "lane_following.json", out / "constant_velocity.json", "--by", "scenario")
-    assert "lane_following minus constant_velocity" in said.out
+    pair = [out / f"{name}.stress.json" for name in ("lane_following", "constant_velocity")]
+    page, figures = tmp_path / "compare.html", tmp_path / "compare.json"
+    said = stylesim("compare", *pair, "--report", page, "--out", figures)
+    assert said.code == 0, said.err
+    assert "lane_following minus constant_velocity, by commanded*scenario" in said.out
+    assert "lane_following against constant_velocity" in page.read_text()
+    cells = json.loads(figures.read_text())["cells"]
+    assert set(cells) == {"all", "commanded", "scenario", "commanded*scenario"}
+    ours, theirs = (json.loads(path.read_text())["accuracy"]["slices"][0]["metrics"]["min_fde_m"] for path in pair)
+    assert cells["all"]["all"]["min_fde_m"]["value"] == pytest.approx(ours["value"] - theirs["value"])
+    mixed = stylesim("compare", pair[0], out / "constant_velocity.json")
+    assert mixed.code == 2
+    assert "one is a stress test" in mixed.err
+    (out / "lane_following.decisions.parquet").unlink()
+    assert "keep both together" in stylesim("compare", *pair).err
     again = stylesim("stress", "constant_velocity", "--corpus", corpus, "--out", out)
     assert again.code == 2
     assert "is there already" in again.err

@@ -67,3 +67,24 @@ def test_a_wrong_answer_is_named(answer: Any, words: str) -> None:
 def test_lengths_and_rates_are_positive(name: str, value: float) -> None:
     with pytest.raises(InputError, match=name):
         made(constant_velocity_in_feet, **{name: value})
+
+
+def untrained(arrays: Mapping[str, np.ndarray]) -> np.ndarray:
+    raise AssertionError("examples ask the model nothing")
+
+
+@pytest.mark.parametrize("unit_m", [1.0, FOOT_M])
+def test_examples_are_what_the_model_will_be_asked(unit_m: float) -> None:
+    """A model that says what the examples say is right at every step of its own, in the scene's frame and metres."""
+    scene = make_scene(n_agents=6, n_frames=140)
+    examples = list(made(untrained, unit_m=unit_m).examples([scene], stride_s=2.0))
+    assert len(examples) == 5  # t0 = 1.9 s, 3.9 s, ..., 9.9 s of 14 s with 4 s ahead
+    inputs, future = examples[2]
+    knowing = made(lambda arrays: future, unit_m=unit_m)
+    task = asked(scene, t0=59, future_steps=40)
+    forecast = knowing.predict([task])[0]
+    truth = scene.tracks.position_m[task.agent_index, 64:100:5]
+    np.testing.assert_allclose(forecast.mode_m[:, 0, 4::5], truth, atol=2e-3)
+    assert inputs["agent"].shape[:3] == (len(task.agent_index), 16, 4)
+    np.testing.assert_allclose(inputs["agent"][:, 0, -1, :2], 0.0, atol=1e-3)
+    assert list(made(untrained).examples([make_scene(n_frames=50)])) == []

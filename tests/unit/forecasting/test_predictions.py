@@ -116,6 +116,24 @@ def test_a_t0_column_keeps_the_times_apart(tmp_path: Path, recorded: Scene) -> N
     assert forecaster.covers(cut(recorded, [0], t0=49)).tolist() == [False]
 
 
+def test_columns_of_rate_and_unit(tmp_path: Path, recorded: Scene) -> None:
+    """A model at 2 Hz that thinks in feet writes its own steps, and says so."""
+    path = tmp_path / "mine.parquet"
+    where = truth(recorded, 0, every=5) / 0.3048
+    row = {
+        "scenario_id": ["abc"], "track_id": ["c-0"], "probability": [1.0], "predicted_trajectory_x": [where[:, 0]],
+        "predicted_trajectory_y": [where[:, 1]], "dt_s": [0.5], "unit_m": [0.3048],
+    }  # fmt: skip
+    pl.DataFrame(row, strict=False).write_parquet(path)
+    forecaster = open_forecaster(str(path))
+    assert forecaster.horizon_s == pytest.approx(6.0)
+    forecast = forecaster.predict([cut(recorded, [0])])[0]
+    np.testing.assert_allclose(forecast.mode_m[0, 0, 4::5], recorded.tracks.position_m[0, 54:110:5], atol=1e-3)
+    pl.DataFrame({**row, "dt_s": [-0.5]}, strict=False).write_parquet(path)
+    with pytest.raises(InputError, match="'dt_s' must hold one positive number"):
+        open_forecaster(str(path))
+
+
 @pytest.mark.parametrize("joint", [False, True])
 @pytest.mark.parametrize("packing", ["plain", "gz", "tar.gz"])
 def test_a_waymo_file_is_at_two_hertz(tmp_path: Path, recorded: Scene, joint: bool, packing: str) -> None:
