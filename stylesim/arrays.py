@@ -14,12 +14,16 @@ def frozen(array: Any, dtype: npt.DTypeLike, shape: tuple[int | None, ...], name
     Any real dtype is taken and stored as `dtype`; the input is copied unless it is read-only already.
     """
     result = np.asarray(array, dtype=dtype)
-    if result.ndim != len(shape) or any(
-        want not in (None, have) for want, have in zip(shape, result.shape, strict=True)
-    ):
+    have = result.shape
+    # Most calls are for lines of a map, by the hundred: no generator, and no comparison where the shape is exact.
+    if have != shape and not (len(have) == len(shape) and _fits(have, shape)):
         wanted = tuple("any" if n is None else n for n in shape)
-        raise ValueError(f"{name} has shape {result.shape}, wanted {wanted}")
+        raise ValueError(f"{name} has shape {have}, wanted {wanted}")
     if result.flags.writeable:
         result = result.copy() if np.may_share_memory(result, array) else result
         result.flags.writeable = False
     return result
+
+
+def _fits(have: tuple[int, ...], want: tuple[int | None, ...]) -> bool:
+    return all(wanted in (None, one) for one, wanted in zip(have, want, strict=True))

@@ -8,6 +8,7 @@ from pathlib import Path
 from xml.etree import ElementTree
 from xml.parsers import expat
 
+from stylesim.collecting import no_collection
 from stylesim.errors import InputError
 
 # Chosen: the largest public lanelet2 and OpenDRIVE maps are below 50 MB; a parsed tree takes about ten times the file.
@@ -24,24 +25,34 @@ def parse(path: Path, *, root: str | None = None) -> ElementTree.Element:
     InputError where the file is missing, too large, damaged, of another root, or declares a document type: with
     it come entities, which can grow without bound or name other files.
     """
-    return tree(checked_bytes(path), path, root=root)
+    return tree(unchecked_bytes(path), path, root=root)
 
 
-def checked_bytes(path: Path) -> bytes:
-    """The content of a well-formed XML file without a document type; InputError as for `parse`."""
-    raw = _bounded(path)
+def unchecked_bytes(path: Path) -> bytes:
+    """The content of a file, packed with gzip or not, for `tree`; InputError where it cannot be read or is too large."""
     try:
-        _refuse_document_type(raw, path)
-    except (expat.ExpatError, ValueError, LookupError) as error:
-        raise InputError(f"{path} is damaged or no XML ({error}); get it again") from error
+        if path.suffix == ".gz":
+            with gzip.open(path, "rb") as packed:
+                raw = packed.read(MAX_BYTES + 1)
+        else:
+            with path.open("rb") as plain:
+                raw = plain.read(MAX_BYTES + 1)
+    except (EOFError, gzip.BadGzipFile, zlib.error) as error:
+        raise InputError(f"{path} is a damaged or truncated gzip file ({error}); get it again") from error
+    except OSError as error:
+        raise InputError(f"cannot read {path}: {error.strerror or error}") from error
+    if len(raw) > MAX_BYTES:
+        raise InputError(f"{path} is larger than {MAX_BYTES >> 20} MB unpacked; that is no map or scenario")
     return raw
 
 
 def tree(raw: bytes, path: Path, *, root: str | None = None) -> ElementTree.Element:
-    """The root element of what `checked_bytes` gave; InputError where it is another one, or something is damaged."""
+    """The root element of the content of `path`; InputError as for `parse`."""
     try:
-        found = ElementTree.fromstring(raw)  # judged before: no document type, hence no entities
-    except (ElementTree.ParseError, ValueError, LookupError) as error:
+        _refuse_document_type(raw, path)
+        with no_collection():
+            found = ElementTree.fromstring(raw)  # judged before: no document type, hence no entities
+    except (ElementTree.ParseError, expat.ExpatError, ValueError, LookupError) as error:
         raise InputError(f"{path} is damaged or no XML ({error}); get it again") from error
     if root is not None and found.tag != root:
         raise InputError(f"{path} is another kind of XML: its root is <{found.tag[:80]}>, expected <{root}>")
@@ -67,23 +78,6 @@ def root_name(path: Path) -> str:
     except (_RootReachedError, expat.ExpatError, OSError, ValueError, LookupError):
         return found
     return found
-
-
-def _bounded(path: Path) -> bytes:
-    try:
-        if path.suffix == ".gz":
-            with gzip.open(path, "rb") as packed:
-                raw = packed.read(MAX_BYTES + 1)
-        else:
-            with path.open("rb") as plain:
-                raw = plain.read(MAX_BYTES + 1)
-    except (EOFError, gzip.BadGzipFile, zlib.error) as error:
-        raise InputError(f"{path} is a damaged or truncated gzip file ({error}); get it again") from error
-    except OSError as error:
-        raise InputError(f"cannot read {path}: {error.strerror or error}") from error
-    if len(raw) > MAX_BYTES:
-        raise InputError(f"{path} is larger than {MAX_BYTES >> 20} MB unpacked; that is no map or scenario")
-    return raw
 
 
 def _refuse_document_type(raw: bytes, path: Path) -> None:

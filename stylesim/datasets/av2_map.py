@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -11,7 +10,8 @@ from typing import Any
 import numpy as np
 from jaxtyping import Float32, Float64, Int64
 
-from stylesim.datasets.guarding import bounded, reading
+from stylesim.datasets.guarding import reading
+from stylesim.datasets.json_files import json_document
 from stylesim.datasets.polylines import MAX_MAP_M
 from stylesim.road import Lane, Road
 
@@ -28,9 +28,8 @@ def read_map(path: Path, origin_m: Float64[np.ndarray, " 2"]) -> Road:
     Centre lines are the file's own where it gives them, else the middle of the boundaries. Ids of successors and
     neighbours outside the map are left out. InputError where the file is damaged or no such map.
     """
-    bounded(path, MAX_FILE_BYTES)
     with reading(path, "Argoverse 2 map"):
-        document = json.loads(path.read_bytes())
+        document = json_document(path, limit_bytes=MAX_FILE_BYTES)
         segments = [s for s in document["lane_segments"].values() if s["lane_type"] in DRIVABLE]
         crossings = list(document.get("pedestrian_crossings", {}).values())
         sides = [s[f"{side}_lane_boundary"] for s in segments for side in ("left", "right")]
@@ -39,6 +38,7 @@ def read_map(path: Path, origin_m: Float64[np.ndarray, " 2"]) -> Road:
         lines = _Lines.of([*sides, *edges, *given], origin_m)
         even = lines.even(len(sides)).reshape(-1, 2, BOUNDARY_POINTS, 2)
         middle = even.mean(axis=1).astype(np.float32)
+        middle.flags.writeable = False
         width = np.median(np.hypot(*np.moveaxis(even[:, 0] - even[:, 1], -1, 0)), axis=-1)
         centre = iter(range(len(sides) + len(edges), len(lines.start)))
         known = {str(s["id"]) for s in segments}
@@ -65,6 +65,7 @@ class _Lines:
     """All lines of a map in one array: a map has hundreds, of a few points each."""
 
     points_m: Float64[np.ndarray, "point 2"]
+    stored_m: Float32[np.ndarray, "point 2"]  # read-only, so that the lanes share it
     start: Int64[np.ndarray, " line"]  # of each line, and the end of the last
 
     @classmethod
@@ -79,11 +80,14 @@ class _Lines:
         start = np.searchsorted(owner[apart], np.arange(len(lines) + 1))
         if (np.diff(start) < 2).any():
             raise ValueError("a line has less than two points")
-        return cls(points[apart], start.astype(np.int64))
+        kept = points[apart]
+        stored = kept.astype(np.float32)
+        stored.flags.writeable = False
+        return cls(kept, stored, start.astype(np.int64))
 
     def line(self, number: int) -> Float32[np.ndarray, "point 2"]:
         """One of the lines."""
-        return self.points_m[self.start[number] : self.start[number + 1]].astype(np.float32)
+        return self.stored_m[self.start[number] : self.start[number + 1]]
 
     def even(self, n: int) -> Float64[np.ndarray, "line sample 2"]:
         """BOUNDARY_POINTS points at equal distances along each of the first `n` lines, ends included."""

@@ -64,7 +64,7 @@ def table_of(file: Path) -> AvTable:
     codes = table["track_id"].cast(pl.Categorical).to_physical().to_numpy()
     rows = np.flatnonzero(kept)
     _, first, code = np.unique(codes[rows], return_index=True, return_inverse=True)
-    names = np.array([str(table["track_id"][int(rows[i])]) for i in first])
+    names = np.array([str(name) for name in table["track_id"].gather(rows[first]).to_list()])
     rank = np.argsort(np.argsort(names))  # agents in the order of their ids
     agent = rank[code]
     key = agent * N_FRAMES + frame[rows]
@@ -76,7 +76,7 @@ def table_of(file: Path) -> AvTable:
         city=single[1],
         focal_track_id=single[2],
         agent_id=tuple(np.sort(names).tolist()),
-        object_type=tuple(str(table["object_type"][int(i)]) for i in rows[begins]),
+        object_type=tuple(str(kind) for kind in table["object_type"].gather(rows[begins]).to_list()),
         agent=agent.astype(np.int64),
         frame=frame[rows],
         numbers=numbers[rows],
@@ -111,14 +111,17 @@ def _once(table: pl.DataFrame, name: str, file: Path) -> str:
 
 
 def _read(file: Path) -> pl.DataFrame:
+    """The columns that are needed, in their types. One thread: a file is small, and starting others costs more."""
     try:
-        table = pl.read_parquet(file)
+        raw = file.read_bytes()
+        schema = pl.read_parquet_schema(raw)
+        absent = [name for name in _COLUMNS if name not in schema]
+        if absent:
+            raise InputError(f"{file} lacks the columns {', '.join(absent)}; it is no scenario of Argoverse 2")
+        table = pl.read_parquet(raw, columns=list(_COLUMNS), parallel="none", use_statistics=False)
     except (OSError, pl.exceptions.PolarsError, pl.exceptions.PanicException) as error:
         reason = (str(error).splitlines() or ["unreadable"])[0]
         raise InputError(f"{file} is damaged or no Parquet file ({reason}); get it again") from error
-    absent = [name for name in _COLUMNS if name not in table.columns]
-    if absent:
-        raise InputError(f"{file} lacks the columns {', '.join(absent)}; it is no scenario of Argoverse 2")
     if all(table.schema[name] == dtype for name, dtype in _COLUMNS.items()):
         return table
     try:

@@ -30,7 +30,7 @@ from stylesim.errors import InputError
 from stylesim.scene import Scene
 from stylesim.signals import SignalState
 from stylesim.tracks import AgentKind
-from stylesim.xmlfiles import checked_bytes, root_name, tree
+from stylesim.xmlfiles import root_name, tree, unchecked_bytes
 
 SOURCE = "commonroad"
 VERSIONS = ("2018b", "2020a")
@@ -87,9 +87,8 @@ def sniff(path: Path) -> bool:
 
 
 def _scenes(file: Path) -> Iterator[Scene]:
-    raw = checked_bytes(file)
     with reading(file, "scenario of CommonRoad"):
-        raw, trajectories = without_trajectories(raw)
+        raw, trajectories = without_trajectories(unchecked_bytes(file))
     root = tree(raw, file, root="commonRoad")
     version = root.get("commonRoadVersion", "")
     if version not in VERSIONS:
@@ -134,7 +133,7 @@ def _table(root: Element, file: Path, trajectories: list[list[State]]) -> tuple[
                     uncertain += 1  # an area or an interval where a place is needed
                     continue
                 step, x, y, heading, speed = read
-                if math.isfinite(heading):  # else the row is unreadable, and counted as such
+                if (dx or dy) and math.isfinite(heading):  # else the row is unreadable, and counted as such
                     x += dx * math.cos(heading) - dy * math.sin(heading)
                     y += dx * math.sin(heading) + dy * math.cos(heading)
                 if fixed:

@@ -1,7 +1,8 @@
 """The states of CommonRoad's trajectories, read from the text: nine tenths of a scenario's XML are these.
 
-The document was checked by the XML parser before. A trajectory whose every state is in the common form (exact values,
-one point) is read by one regular expression; any other, and a document with comments or CDATA, is left to the tree.
+A trajectory whose every state is in the common form (exact values, one point), with nothing but white space between, is
+read by a regular expression; any other, and a document with comments or CDATA, is left to the XML parser, which judges
+the rest of the document.
 """
 
 from __future__ import annotations
@@ -19,7 +20,9 @@ _FIELDS = (
     rb"<(?:acceleration|velocityY|accelerationY|yawRate|slipAngle|steeringAngle|jerk)>\s*<exact>[^<]*</exact>\s*"
     rb"</(?:acceleration|velocityY|accelerationY|yawRate|slipAngle|steeringAngle|jerk)>",
 )
-_STATE = re.compile(rb"<state>\s*(?:(?:" + rb"|".join(_FIELDS) + rb")\s*)+</state>")
+_ANY_ORDER = re.compile(rb"\s*<state>\s*(?:(?:" + rb"|".join(_FIELDS) + rb")\s*)+</state>")
+# The order of most files; three times as fast.
+_USUAL_ORDER = re.compile(rb"\s*<state>\s*" + rb"\s*".join(_FIELDS[:4]) + rb"\s*(?:" + _FIELDS[4] + rb"\s*)*</state>")
 _BEGIN, _END = b"<trajectory>", b"</trajectory>"
 
 State = tuple[int, float, float, float, float]  # step, x, y, orientation, speed
@@ -48,8 +51,8 @@ def without_trajectories(raw: bytes) -> tuple[bytes, list[list[State]]]:
 
 def _states(text: bytes) -> list[State] | None:
     """All states of a trajectory; None unless each is in the common form, with every value that is needed."""
-    rows = _STATE.findall(text)
-    if len(rows) != text.count(b"<state"):
+    rows = _rows(_USUAL_ORDER, text) or _rows(_ANY_ORDER, text)
+    if rows is None:
         return None
     states = []
     for x, y, heading, time, speed in rows:
@@ -57,3 +60,12 @@ def _states(text: bytes) -> list[State] | None:
             return None
         states.append((int(time), float(x), float(y), float(heading), float(speed or 0)))
     return states
+
+
+def _rows(pattern: re.Pattern[bytes], text: bytes) -> list[tuple[bytes, ...]] | None:
+    """The groups of each state; None where something that is no such state stands before, between or behind them."""
+    found, end = [], 0
+    while (match := pattern.match(text, end)) is not None:
+        found.append(match.groups())
+        end = match.end()
+    return found if found and not text[end:].strip() else None

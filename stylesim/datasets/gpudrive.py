@@ -6,7 +6,6 @@ One file is one scenario of 91 frames at 10 Hz. Sizes are one per object, headin
 
 from __future__ import annotations
 
-import json
 from collections.abc import Callable, Iterator, Mapping
 from pathlib import Path
 from typing import Any
@@ -15,7 +14,8 @@ import numpy as np
 
 from stylesim.datasets.accounting import row_counts
 from stylesim.datasets.dense import checked_tracks, origin_of
-from stylesim.datasets.guarding import bounded, reading
+from stylesim.datasets.guarding import reading
+from stylesim.datasets.json_files import json_document
 from stylesim.datasets.light_states import light_state
 from stylesim.datasets.polyline_map import PolylineLane, PolylineMap, road_of
 from stylesim.datasets.sniffing import head, listed, matching
@@ -38,9 +38,8 @@ _NOT_SCENARIOS = ("valid_files.json", "invalid_files.json")  # lists of names th
 def scenes(path: str | Path) -> Iterator[Scene]:
     """The scenarios of a JSON file, or of every one in a folder, by name. InputError names what is damaged."""
     for file in files(path):
-        bounded(file, MAX_FILE_BYTES)
         with reading(file, "scenario of GPUDrive or Nocturne"):
-            scene = _scene(json.loads(file.read_bytes()), file)
+            scene = _scene(json_document(file, limit_bytes=MAX_FILE_BYTES), file)
         yield scene
 
 

@@ -6,7 +6,6 @@ or to the right, all of one radius), lanes also the nodes of their dividers. Spe
 
 from __future__ import annotations
 
-import json
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
@@ -14,7 +13,8 @@ from typing import Any
 import numpy as np
 from jaxtyping import Float32, Float64
 
-from stylesim.datasets.guarding import bounded, reading
+from stylesim.datasets.guarding import reading
+from stylesim.datasets.json_files import json_document
 from stylesim.datasets.polylines import map_line, stop_line_at
 from stylesim.geometry import arc_length
 from stylesim.road import Lane, Road
@@ -30,9 +30,8 @@ _TURN = {"L": 1.0, "S": 0.0, "R": -1.0}
 
 def read_map(path: Path) -> Road:
     """The road in the map's own frame. InputError where the file is damaged or no such map."""
-    bounded(path, MAX_FILE_BYTES)
     with reading(path, "nuScenes map expansion"):
-        document = json.loads(path.read_bytes())
+        document = json_document(path, limit_bytes=MAX_FILE_BYTES)
         nodes = {n["token"]: (float(n["x"]), float(n["y"])) for n in document["node"]}
         areas = {p["token"]: p["exterior_node_tokens"] for p in document["polygon"]}
         outline = {token: [nodes[n] for n in areas[token]] for token in areas}

@@ -11,6 +11,7 @@ from collections.abc import Callable, Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
+from stylesim.collecting import no_collection
 from stylesim.datasets import safe_pickle
 from stylesim.datasets.accounting import row_counts
 from stylesim.datasets.dense import checked_tracks
@@ -36,7 +37,9 @@ def scenes(path: str | Path) -> Iterator[Scene]:
     for file in files(path):
         bounded(file, MAX_FILE_BYTES)
         with reading(file, "scenario of ScenarioNet"):
-            scene = _scene(safe_pickle.loads(file.read_bytes()), file)
+            with no_collection():
+                document = safe_pickle.loads(file.read_bytes())
+            scene = _scene(document, file)
         yield scene
 
 

@@ -66,7 +66,7 @@ def recording_of(
             f"{source.file}: {dropped['unreadable']} of {before} rows are not readable and {dropped['implausible']} "
             "cannot be road users in metres; it is damaged or in other units"
         )
-    once = table.unique(["agent", "frame"], keep="first", maintain_order=True).sort("agent", "frame")
+    once = _once(table.sort("agent", "frame", maintain_order=True))
     dropped["duplicate"] = dropped.get("duplicate", 0) + table.height - once.height
     recording = _derived(once, source, signals, dropped, front=front)
     row_counts(rows_out=len(recording.frame), dropped=dropped, rows_in=before + sum(source.dropped.values()))
@@ -113,10 +113,22 @@ def _kept(table: pl.DataFrame, condition: pl.Expr, reason: str, dropped: dict[st
     return kept
 
 
+def _once(ordered: pl.DataFrame) -> pl.DataFrame:
+    """The first row of each agent in each frame."""
+    agent, frame = ordered["agent"], ordered["frame"]
+    again = ((agent == agent.shift()) & (frame == frame.shift())).fill_null(False)
+    return ordered.filter(~again) if again.any() else ordered
+
+
+def _numbers(table: pl.DataFrame, *names: str) -> Float64[np.ndarray, "row _"]:
+    """Columns beside one another; a missing number is NaN."""
+    return np.stack([table[name].to_numpy().astype(np.float64) for name in names], axis=1)
+
+
 def _origin(table: pl.DataFrame) -> Float64[np.ndarray, " 2"]:
     """Near the first road users: what comes later moves nothing."""
     first = table.sort("frame", maintain_order=True).head(ORIGIN_ROWS)
-    return np.asarray(np.round(np.median(first.select("x", "y").to_numpy(), axis=0), -2)) + 0.0  # no -0.0
+    return np.asarray(np.round(np.median(_numbers(first, "x", "y"), axis=0), -2)) + 0.0  # no -0.0
 
 
 def _lost(dropped: dict[str, int]) -> str:
@@ -129,11 +141,11 @@ def _derived(
 ) -> Recording:
     names, agent = np.unique(table["agent"].to_numpy(), return_inverse=True)
     agent, frame = agent.astype(np.int64), table["frame"].to_numpy().astype(np.int64)
-    position = table.select("x", "y").to_numpy().astype(np.float64)
+    position = _numbers(table, "x", "y")
     velocity, heading, ahead = _motion(table, agent, frame, position, source.dt_s)
     first = np.searchsorted(agent, np.arange(len(names)))  # what is known when it appears
     kind = table["kind"].to_numpy()[first].astype(np.int8)
-    size, guessed = completed(table.select("length", "width").to_numpy().astype(np.float64)[first], kind)
+    size, guessed = completed(_numbers(table, "length", "width")[first], kind)
     keep = np.isfinite(velocity).all(axis=1)
     dropped["velocity_unknown"] = int((~keep).sum())
     motor = np.isin(kind, _MOTOR)
@@ -170,7 +182,7 @@ def _motion(
     position: Float64[np.ndarray, "row 2"],
     dt_s: float,
 ) -> tuple[Float64[np.ndarray, "row 2"], Float64[np.ndarray, " row"], Int64[np.ndarray, " row"]]:
-    velocity = table.select("vx", "vy").to_numpy().astype(np.float64)
+    velocity = _numbers(table, "vx", "vy")
     heading = table["heading"].to_numpy().astype(np.float64)
     ahead = np.zeros(len(agent), np.int64)
     speed = table["speed"].to_numpy().astype(np.float64)

@@ -144,3 +144,31 @@ def test_what_commonroad_io_reads(shared_data):
     shown = {i: SignalState(k).name for i, k in zip(scene.signals.signal_id, scene.signals.state[:, 5], strict=True)}
     expected = dict.fromkeys(("3772", "3773", "3775", "3778"), "RED") | dict.fromkeys(("3776", "3777", "3779"), "GREEN")
     assert shown == expected | {"3774": "DARK"}
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "says"),
+    [
+        ("</state>", "</stbte>", "no XML"),
+        ("</state>", "</state> <open>", "no XML"),
+        ("<trajectory>", "<trajectory>&unknown;", "no XML"),
+        ("<commonRoad", '<!DOCTYPE commonRoad [<!ENTITY a "<trajectory>">]><commonRoad', "document type"),
+    ],
+)
+def test_what_is_no_xml_within_a_trajectory_is_refused(tmp_path, old, new, says):
+    path = commonroad.write(tmp_path)
+    text = path.read_text()
+    at = text.index(old, text.index("<trajectory>") if old == "</state>" else 0)
+    path.write_text(text[:at] + new + text[at + len(old) :])
+    with pytest.raises(InputError, match=says):
+        list(scenes(path))
+
+
+def test_words_between_states_do_not_cost_a_state(tmp_path):
+    path = commonroad.write(tmp_path)
+    (plain,) = scenes(path)
+    text = path.read_text()
+    at = text.index("</state>", text.index("<trajectory>")) + len("</state>")
+    path.write_text(text[:at] + " and then " + text[at:])
+    (other,) = scenes(path)
+    np.testing.assert_array_equal(other.tracks.position_m, plain.tracks.position_m)

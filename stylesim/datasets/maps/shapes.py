@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-from jaxtyping import Bool, Float, Float64
+from jaxtyping import Bool, Float, Float64, Int64
 
 from stylesim.geometry import arc_length
 
@@ -77,16 +77,29 @@ def crossed(lines_m: Sequence[Float64[np.ndarray, "_ 2"]]) -> Bool[np.ndarray, "
 
 
 def _cross(one: Float[np.ndarray, "a 2"], other: Float[np.ndarray, "b 2"]) -> bool:
-    p, r = one[:-1, None], np.diff(one, axis=0)[:, None]
-    q, s = other[None, :-1], np.diff(other, axis=0)[None]
+    first, second = _reaching(one, other), _reaching(other, one)  # most segments of most pairs cannot meet
+    if not (len(first) and len(second)):
+        return False
+    p, r = one[first, None], (one[first + 1] - one[first])[:, None]
+    q, s = other[None, second], (other[second + 1] - other[second])[None]
     cross = r[..., 0] * s[..., 1] - r[..., 1] * s[..., 0]
     apart = q - p
     with np.errstate(divide="ignore", invalid="ignore"):
         t = (apart[..., 0] * s[..., 1] - apart[..., 1] * s[..., 0]) / cross
         u = (apart[..., 0] * r[..., 1] - apart[..., 1] * r[..., 0]) / cross
+    meet = (t >= 0) & (t <= 1) & (u >= 0) & (u <= 1)
+    if not meet.any():
+        return False
     sine = np.abs(cross) / np.maximum(np.hypot(r[..., 0], r[..., 1]) * np.hypot(s[..., 0], s[..., 1]), 1e-12)
-    meet = (t >= 0) & (t <= 1) & (u >= 0) & (u <= 1) & (sine > np.sin(MIN_CROSSING_RAD))
-    along = (np.arange(len(one) - 1)[:, None] + t) / (len(one) - 1)
-    across = (np.arange(len(other) - 1)[None] + u) / (len(other) - 1)
+    meet &= sine > np.sin(MIN_CROSSING_RAD)
+    along = (first[:, None] + t) / (len(one) - 1)
+    across = (second[None] + u) / (len(other) - 1)
     inner = (along > 0.02) & (along < 0.98) & (across > 0.02) & (across < 0.98)  # chosen: 2 % of the length are ends
     return bool((meet & inner).any())
+
+
+def _reaching(one: Float[np.ndarray, "a 2"], other: Float[np.ndarray, "b 2"]) -> Int64[np.ndarray, " segment"]:
+    """The segments of one line whose boxes touch the box of the other, with a millimetre to spare for rounding."""
+    low, high = other.min(axis=0) - SAME_POINT_M, other.max(axis=0) + SAME_POINT_M
+    over, under = one >= low, one <= high
+    return np.flatnonzero(((over[:-1] | over[1:]) & (under[:-1] | under[1:])).all(axis=1))

@@ -1,9 +1,11 @@
+import itertools
+
 import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from stylesim.datasets.maps.shapes import aligned, between, crossed, distinct
+from stylesim.datasets.maps.shapes import MIN_CROSSING_RAD, aligned, between, crossed, distinct, evenly
 from stylesim.datasets.maps.units import speed_mps
 
 
@@ -47,6 +49,30 @@ def test_lanes_cross_but_do_not_when_they_merge_or_follow():
     merging = np.array([[0.0, -8], [60, -2], [100, 0]])
     assert crossed([east, north, beside, after]).tolist() == [True, True, True, False]
     assert not crossed([east, beside, after, merging]).any()
+
+
+def crossing_of_all_segments(one, other):
+    """The angle and the places (shares of the lines) of every meeting of two lines, pair of segments by pair."""
+    for i, j in itertools.product(range(len(one) - 1), range(len(other) - 1)):
+        r, s = one[i + 1] - one[i], other[j + 1] - other[j]
+        cross = r[0] * s[1] - r[1] * s[0]
+        if cross:
+            gap = other[j] - one[i]
+            t, u = (gap[0] * s[1] - gap[1] * s[0]) / cross, (gap[0] * r[1] - gap[1] * r[0]) / cross
+            if 0 <= t <= 1 and 0 <= u <= 1:
+                sine = abs(cross) / (np.hypot(*r) * np.hypot(*s))
+                yield sine, (i + t) / (len(one) - 1), (j + u) / (len(other) - 1)
+
+
+@given(seed=st.integers(0, 10_000), points=st.tuples(st.integers(2, 12), st.integers(2, 12)), far=st.floats(0, 60))
+def test_crossings_are_those_of_all_pairs_of_segments(seed, points, far):
+    rng = np.random.default_rng(seed)
+    one, other = (np.cumsum(rng.normal(3, 4, (n, 2)), axis=0) for n in points)
+    other += far
+    one, other = evenly(one, len(one)), evenly(other, len(other))
+    found = list(crossing_of_all_segments(one, other))
+    wanted = any(sine > np.sin(MIN_CROSSING_RAD) and 0.02 < a < 0.98 and 0.02 < b < 0.98 for sine, a, b in found)
+    assert crossed([one, other]).tolist() == [wanted] * 2
 
 
 @pytest.mark.parametrize(
