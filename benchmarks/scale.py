@@ -1,38 +1,42 @@
 """Reading a large data set: speed, memory and disk, and what they make of 1 TB.
 
-    python -m benchmarks.scale [--gigabytes 10] [--workers 2] [--scenario DIR] [--quick]
+    python -m benchmarks.scale [--gigabytes 10] [--workers 2] [--scenario DIR] [--quick] [--folder DIR]
 
 One Argoverse 2 scenario is repeated until the source has so many GB, each time under a new id and moved by another
 part of a metre: else every map would be the same road, which a corpus keeps once. Each run is a fresh process on a
-source of another size; the disk cache holds it, so the disk's own bandwidth is not measured. Extrapolated is from the
-largest run, the others give the spread. Disk is not taken from the repeated scenarios, whose tracks are so alike that
-they compress to almost nothing, but from the different ones of --data.
+source that goes on where the smaller one ended; the disk cache holds it, so the disk's own bandwidth is not measured.
+Extrapolated is from the largest run, the others give the spread. CPU seconds are those of all processes: on a machine
+with other work they say more than wall time. Disk is not taken from the repeated scenarios, whose tracks are so alike
+that they compress to almost nothing, but from the different ones of --data. With --folder each run is noted there when
+it ends, and a repeated command goes on after it.
 """
 
 from __future__ import annotations
 
 import argparse
 import json
+import os
+import re
+import shutil
 import statistics
 import subprocess
 import sys
 import tempfile
 import time
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import polars as pl
 
-SHARES = (0.125, 0.25, 0.5, 1.0)  # of the asked size
+SHARES = (0.01, 0.05, 0.2, 1.0)  # of the asked size
 QUICK_GB = 0.1  # a minute
 READ = """
 import resource, sys
 from stylesim.datasets.reading import read
 if __name__ == "__main__":
     read("av2", sys.argv[1], out=sys.argv[2], workers=int(sys.argv[3]))
-    peaks = [resource.getrusage(who).ru_maxrss / 1024 for who in (resource.RUSAGE_SELF, resource.RUSAGE_CHILDREN)]
-    print(*peaks)
+    used = [resource.getrusage(who) for who in (resource.RUSAGE_SELF, resource.RUSAGE_CHILDREN)]
+    print(*(one.ru_maxrss / 1024 for one in used), sum(one.ru_utime + one.ru_stime for one in used))
 """
 
 
@@ -41,11 +45,18 @@ def size_of(folder: Path, *patterns: str) -> int:
     return sum(file.stat().st_size for pattern in patterns for file in folder.rglob(pattern) if file.is_file())
 
 
-def moved(value: Any, by: float) -> Any:
-    """A map with every x moved by so many metres."""
-    if isinstance(value, dict):
-        return {key: item + by if key == "x" else moved(item, by) for key, item in value.items()}
-    return [moved(item, by) for item in value] if isinstance(value, list) else value
+class Moved:
+    """A map file whose every x can be moved; its text is taken apart once."""
+
+    def __init__(self, file: Path) -> None:
+        parts = re.split(rb'("x":\s*)(-?[0-9.]+)', file.read_bytes())
+        self._x = [float(part) for part in parts[2::3]]
+        self._between = [a + b for a, b in zip(parts[0::3], [*parts[1::3], b""], strict=True)]
+
+    def by(self, metres: float) -> bytes:
+        """The text of the moved map."""
+        moved = [b"%.3f" % (x + metres) for x in self._x] + [b""]
+        return b"".join(piece for pair in zip(self._between, moved, strict=True) for piece in pair)
 
 
 def disk(source: Path, folder: Path) -> None:
@@ -60,24 +71,57 @@ def disk(source: Path, folder: Path) -> None:
     print(f"whole corpus {kept / given:.2f} of the whole source")
 
 
-def written(scenario: Path, target: Path, gigabytes: float) -> int:
-    """Repeat a scenario's folder in `target` until it has so many GB; how many were made."""
+def written(scenario: Path, target: Path, gigabytes: float) -> None:
+    """Repeat a scenario's folder in `target` until it has so many GB; what is there already counts."""
     table = pl.read_parquet(next(scenario.glob("scenario_*.parquet")))
-    road = json.loads(next(scenario.glob("log_map_archive_*.json")).read_bytes())
-    rng = np.random.default_rng(0)
-    made, total = 0, 0
+    road = Moved(next(scenario.glob("log_map_archive_*.json")))
+    target.mkdir(parents=True, exist_ok=True)
+    made, total = sum(1 for _ in target.iterdir()), size_of(target, "*")
     while total < gigabytes * 1e9:
         name = f"{made:08d}"
         folder = target / name
-        folder.mkdir(parents=True)
+        folder.mkdir()
         file = folder / f"scenario_{name}.parquet"
-        by = float(rng.random())
+        by = float(np.random.default_rng(made).random())
         table.with_columns(pl.col("position_x") + by, scenario_id=pl.lit(name)).write_parquet(file)
         map_file = folder / f"log_map_archive_{name}.json"
-        map_file.write_text(json.dumps(moved(road, by)))
+        map_file.write_bytes(road.by(by))
         total += file.stat().st_size + map_file.stat().st_size
         made += 1
-    return made
+
+
+def run(source: Path, folder: Path, workers: int) -> dict[str, float]:
+    """Read the source in a fresh process; what it took."""
+    script, out = folder / "script.py", folder / "corpus"
+    script.write_text(READ)
+    begin = time.perf_counter()
+    done = subprocess.run(
+        [sys.executable, str(script), str(source), str(out), str(workers)], check=True, capture_output=True, text=True
+    )
+    wall_s = time.perf_counter() - begin
+    parent, worker, cpu_s = (float(value) for value in done.stdout.split())
+    shutil.rmtree(out)
+    return {
+        "gb": size_of(source, "*") / 1e9, "scenarios": sum(1 for _ in source.iterdir()), "wall_s": wall_s,
+        "cpu_s": cpu_s, "parent_mib": parent, "worker_mib": worker, "load": os.getloadavg()[1], "workers": workers,
+    }  # fmt: skip
+
+
+def report(rows: list[dict[str, float]]) -> None:
+    """Print what the runs say together."""
+    first, last = rows[0], rows[-1]
+    before = rows[-2] if len(rows) > 1 else first  # small runs grow by what Python and its libraries load
+    slope = (last["parent_mib"] - before["parent_mib"]) / max(last["scenarios"] - before["scenarios"], 1)
+    n_tb = 1000 / last["gb"] * last["scenarios"]
+    print(f"growth of the peak, {first['scenarios']:.0f} to {last['scenarios']:.0f} scenarios: parent ", end="")
+    print(f"{last['parent_mib'] / first['parent_mib']:.2f}, worker {last['worker_mib'] / first['worker_mib']:.2f}")
+    speeds = [row["gb"] / row["wall_s"] * 3600 for row in rows]
+    per_cpu = [row["gb"] / row["cpu_s"] * 3600 for row in rows]
+    for name, values in (("GB per hour", speeds), ("GB per CPU hour", per_cpu)):
+        print(f"{name}, n = {len(rows)}: {statistics.median(values):.2f} [{min(values):.2f} .. {max(values):.2f}]")
+    print(f"1 TB is {n_tb:.0f} such scenarios; {last['workers']:.0f} workers: {1000 / speeds[-1]:.0f} h ", end="")
+    print(f"[{1000 / max(speeds):.0f} .. {1000 / min(speeds):.0f}], {1000 / per_cpu[-1]:.0f} CPU hours,")
+    print(f"parent {last['parent_mib'] + slope * (n_tb - last['scenarios']):.0f} MiB if its growth goes on in a line")
 
 
 def main() -> None:
@@ -90,39 +134,31 @@ def main() -> None:
     )
     parser.add_argument("--data", type=Path, default=Path("../shared/data/av2"))
     parser.add_argument("--quick", action="store_true", help=f"{QUICK_GB:g} GB instead")
+    parser.add_argument("--folder", type=Path, help="where the source and the runs are kept; default: nowhere")
     asked = parser.parse_args()
     scenario = asked.scenario or min(p for p in asked.data.iterdir() if p.is_dir())
     gigabytes = QUICK_GB if asked.quick else asked.gigabytes
-    speeds, peaks = [], []
-    for share in SHARES:
-        with tempfile.TemporaryDirectory() as folder:
-            source, out, script = Path(folder) / "source", Path(folder) / "corpus", Path(folder) / "script.py"
-            n = written(scenario, source, gigabytes * share)
-            script.write_text(READ)
-            gb = size_of(source, "*") / 1e9
-            begin = time.perf_counter()
-            done = subprocess.run(
-                [sys.executable, str(script), str(source), str(out), str(asked.workers)],
-                check=True, capture_output=True, text=True,
-            )  # fmt: skip
-            hours = (time.perf_counter() - begin) / 3600
-            parent, worker = (float(value) for value in done.stdout.split())
-            speeds.append(gb / hours)
-            peaks.append((n, parent, worker))
-            print(f"{gb:8.3f} GB, {n} scenarios: {gb / hours:7.2f} GB/h, peak MiB ", end="")
-            print(f"{parent:.0f} (parent), {worker:.0f} (largest worker)", flush=True)
-    (n0, parent0, worker0), (n1, parent1, worker1) = peaks[0], peaks[-1]
-    slope = (parent1 - parent0) / (n1 - n0)
-    n_tb = 1000 / gb * n1
-    print(f"growth of the peak, {n0} to {n1} scenarios: parent {parent1 / parent0:.2f}, ", end="")
-    print(f"worker {worker1 / worker0:.2f}")
-    print(f"GB/h, n = {len(speeds)}: {statistics.median(speeds):.2f} [{min(speeds):.2f} .. {max(speeds):.2f}]")
-    low, high = 1000 / max(speeds), 1000 / min(speeds)
-    print(f"1 TB is {n_tb:.0f} such scenarios; {asked.workers} workers: ", end="")
-    print(f"{1000 / speeds[-1]:.0f} h [{low:.0f} .. {high:.0f}],")
-    print(f"parent {parent1 + slope * (n_tb - n1):.0f} MiB if its growth goes on in a line")
-    with tempfile.TemporaryDirectory() as folder:
-        disk(asked.data, Path(folder))
+    with tempfile.TemporaryDirectory() as temporary:
+        folder = asked.folder or Path(temporary)
+        folder.mkdir(parents=True, exist_ok=True)
+        notes = folder / "runs.jsonl"
+        rows = [json.loads(line) for line in notes.read_text().splitlines()] if notes.is_file() else []
+        for share in SHARES:
+            if any(row["gb"] >= gigabytes * share for row in rows):
+                continue
+            written(scenario, folder / "source", gigabytes * share)
+            rows.append(run(folder / "source", folder, asked.workers))
+            with notes.open("a") as file:
+                file.write(json.dumps(rows[-1]) + "\n")
+        for row in rows:
+            print(f"{row['gb']:8.3f} GB, {row['scenarios']:.0f} scenarios: {row['wall_s']:.0f} s, ", end="")
+            print(
+                f"{row['cpu_s']:.0f} CPU s (load {row['load']:.1f}), peak {row['parent_mib']:.0f} MiB (parent), ",
+                end="",
+            )
+            print(f"{row['worker_mib']:.0f} (largest worker)")
+        report(rows)
+        disk(asked.data, Path(temporary))
 
 
 if __name__ == "__main__":
