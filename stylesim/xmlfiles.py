@@ -29,7 +29,7 @@ def parse(path: Path, *, root: str | None = None) -> ElementTree.Element:
 
 
 def unchecked_bytes(path: Path) -> bytes:
-    """The content of a file, packed with gzip or not, for `tree`; InputError where it cannot be read or is too large."""
+    """The content of a file, packed with gzip or not, for `tree`. InputError if it is damaged or too large."""
     try:
         if path.suffix == ".gz":
             with gzip.open(path, "rb") as packed:
