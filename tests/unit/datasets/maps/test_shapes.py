@@ -69,8 +69,7 @@ def test_crossings_are_those_of_all_pairs_of_segments(seed, points, far):
     rng = np.random.default_rng(seed)
     one, other = (np.cumsum(rng.normal(3, 4, (n, 2)), axis=0) for n in points)
     other += far
-    one, other = evenly(one, len(one)), evenly(other, len(other))
-    found = list(crossing_of_all_segments(one, other))
+    found = list(crossing_of_all_segments(evenly(one, len(one)), evenly(other, len(other))))
     wanted = any(sine > np.sin(MIN_CROSSING_RAD) and 0.02 < a < 0.98 and 0.02 < b < 0.98 for sine, a, b in found)
     assert crossed([one, other]).tolist() == [wanted] * 2
 
