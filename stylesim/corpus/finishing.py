@@ -28,7 +28,8 @@ SCENE_SCHEMA = {
     "counts": pl.String, "parameters": pl.String, "signals": pl.String, "twin_of": pl.String, "replay_of": pl.String,
     "metadata": pl.String,
 }  # fmt: skip
-ROW_GROUP = 1 << 13  # of the scene table; chosen: some 4 MB, which is what finishing holds of it at a time
+# Of the scene table; chosen: some MB each, for tables of a few rows, as parts give them, take ten times their content.
+ROW_GROUP, PART_ROWS = 1 << 12, 1 << 9
 
 
 @dataclass
@@ -64,7 +65,7 @@ def brought_together(partial: Path, records: Iterable[Path]) -> Sums:
     CorpusError where there is no scene, or two have the same id, or the disk is full.
     """
     records = list(records)
-    table = TableFile(partial / "scenes.parquet", row_group=ROW_GROUP)
+    table = TableFile(partial / "scenes.parquet", row_group=ROW_GROUP, part_rows=PART_ROWS)
     sums, hashes = Sums(), array("Q")
     try:
         for record in _read(records):

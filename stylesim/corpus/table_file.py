@@ -18,14 +18,15 @@ PART_ROWS = 1 << 16
 class TableFile:
     """Takes tables with the same columns one by one. Call `finish`, and `discard` in any case.
 
-    Up to PART_ROWS rows (a row group, where that is less) are held; more go to part files in a hidden folder beside
-    the file and are joined at the end, one row group at a time. The same rows give the same bytes, however they were
+    Up to `part_rows` rows (PART_ROWS, where not given) are held; more go to part files in a hidden folder beside the
+    file and are joined at the end, one row group at a time. The same rows give the same bytes, however they were
     cut into tables.
     """
 
-    def __init__(self, path: Path, *, row_group: int = ROW_GROUP) -> None:
+    def __init__(self, path: Path, *, row_group: int = ROW_GROUP, part_rows: int | None = None) -> None:
         self.path = path
         self._row_group = row_group
+        self._part_rows = PART_ROWS if part_rows is None else part_rows
         self._parts = path.with_name(f".{path.name}.{os.getpid()}.parts")
         self._count = 0
         self._waiting: list[pl.DataFrame] = []
@@ -35,7 +36,7 @@ class TableFile:
         """Append a table. CorpusError if the disk is full or the folder cannot be written."""
         self._waiting.append(table)
         self._rows += table.height
-        if self._rows >= min(PART_ROWS, self._row_group):
+        if self._rows >= self._part_rows:
             self._write_part()
 
     def finish(self) -> str:

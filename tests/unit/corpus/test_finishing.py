@@ -6,7 +6,7 @@ import numpy as np
 import polars as pl
 import pytest
 
-from stylesim.corpus import finishing, table_file
+from stylesim.corpus import finishing
 from stylesim.corpus.finishing import brought_together, records_of
 from stylesim.errors import CorpusError
 
@@ -46,10 +46,9 @@ def test_the_table_is_in_the_order_of_the_parts_and_the_sums_are_right(partial):
 
 
 def test_a_table_that_does_not_fit_into_memory_is_the_same(partial, monkeypatch):
-    monkeypatch.setattr(finishing, "ROW_GROUP", 1 << 13)
     brought_together(partial, records_of(partial))
     whole = (partial / "scenes.parquet").read_bytes()
-    monkeypatch.setattr(table_file, "PART_ROWS", 9)  # the row group is as before
+    monkeypatch.setattr(finishing, "PART_ROWS", 9)
     brought_together(partial, records_of(partial))
     assert (partial / "scenes.parquet").read_bytes() == whole
     assert sorted(path.name for path in partial.iterdir()) == ["records", "scenes.parquet"]
