@@ -3,12 +3,14 @@ import sqlite3
 import numpy as np
 import pytest
 
-from stylesim.datasets.nuplan import scenes
+from stylesim.datasets.maps.projection import utm
+from stylesim.datasets.nuplan import map_of, scenes
+from stylesim.datasets.nuplan_map import city_map
 from stylesim.errors import InputError
 from stylesim.signals import SignalState
 from stylesim.tracks import AgentKind, TrackFlag
 from tests.formats import nuplan_files as nuplan
-from tests.formats.world import World
+from tests.formats.world import CROSSWALK, ORIGIN, SPEED_LIMIT_MPS, World
 
 
 def test_values_are_read_exactly(tmp_path):
@@ -120,3 +122,107 @@ def test_a_real_log(shared_data):
     stated = np.concatenate([t.speed_mps[0, 1:] for t in ego])
     assert np.abs(steps - stated).mean() < 0.3  # stated speeds are 4 % above the displacement in this log
     assert not any(t.flagged(TrackFlag.IMPLAUSIBLE).any() for t in ego)
+
+
+def around(file):
+    """The road of the first scene with its origin added, by lane."""
+    scene = next(iter(scenes(file)))
+    return scene, {lane.lane_id: lane for lane in scene.road.lanes}
+
+
+def test_the_map_beside_the_logs_is_read(tmp_path):
+    nuplan.write_map(tmp_path)
+    scene, lanes = around(nuplan.write(tmp_path / "nuplan-v1.1" / "splits" / "mini"))
+    shift = scene.tracks.origin_m
+    assert set(lanes) == {"21", "22", "23", "24", "49585", "49586"}
+    first, joint = lanes["21"], lanes["49585"]
+    np.testing.assert_allclose(first.centre_line_m + shift, [(1140, -340), (1195, -340), (1250, -340)], atol=1e-3)
+    assert first.width_m == pytest.approx(3.5, abs=1e-3)
+    assert first.speed_limit_mps == pytest.approx(SPEED_LIMIT_MPS)
+    assert np.isnan(lanes["22"].speed_limit_mps)
+    assert (first.successors, joint.successors, lanes["22"].successors) == (("49585",), ("22",), ())
+    assert (first.left_neighbour, first.right_neighbour) == ("23", "")
+    assert (lanes["23"].left_neighbour, lanes["23"].right_neighbour) == ("", "21")
+    assert [lanes[i].in_junction for i in ("21", "49585")] == [False, True]
+    # The boundary 33 was drawn against the direction of the lane.
+    np.testing.assert_allclose(lanes["23"].left_boundary_m[[0, -1], 0] + shift[0], [1140, 1360], atol=1e-3)
+    np.testing.assert_allclose(first.stop_line_m + shift, [(1248, -341.75), (1248, -338.25)], atol=1e-3)
+    np.testing.assert_allclose(joint.stop_line_m[:, 0] + shift[0], [1248, 1248], atol=1e-3)
+    np.testing.assert_allclose(scene.road.crosswalks_m[0] + shift, CROSSWALK, atol=1e-3)
+    assert scene.signals.lane_id == (("49585",),)
+    without = next(iter(scenes(tmp_path / "nuplan-v1.1" / "splits" / "mini", map="none")))
+    assert without.road is None
+
+
+def test_a_map_in_degrees_comes_to_the_same_place(tmp_path):
+    """Degrees are found by Newton's method from the projection that is tested against PROJ."""
+    there = np.array([664_000.0, 3_998_000.0])
+
+    def degrees(points):
+        wanted, found = points - ORIGIN + there, np.full((len(points), 2), [36.1, -115.2])
+        for _ in range(20):
+            here = utm(*found.T, zone=11)
+            step = [(utm(*(found + d).T, zone=11) - here) / 1e-6 for d in ([1e-6, 0.0], [0.0, 1e-6])]
+            found += np.linalg.solve(np.stack(step, -1), (wanted - here)[..., None])[..., 0]
+        return found[:, ::-1]
+
+    city = city_map(nuplan.write_map(tmp_path / "a", place=degrees, srs=4326))
+    plain = city_map(nuplan.write_map(tmp_path / "b", place=lambda p: p - ORIGIN + there))
+    for one, other in zip(city.lanes, plain.lanes, strict=True):
+        assert one.lane_id == other.lane_id
+        np.testing.assert_allclose(one.centre_line_m, other.centre_line_m, atol=1e-3)
+
+
+def test_the_road_does_not_know_how_the_scene_goes_on(tmp_path):
+    nuplan.write_map(tmp_path)
+    whole = nuplan.write(tmp_path / "logs")
+    cut = nuplan.write(
+        tmp_path / "short", damage=f"DELETE FROM lidar_pc WHERE timestamp > {nuplan.BEGIN_US + 50_000 * 100}"
+    )
+    (_, lanes), (_, others) = around(whole), around(cut)
+    assert list(lanes) == list(others)
+
+
+@pytest.mark.parametrize(
+    ("damage", "message"),
+    [
+        ("UPDATE meta SET value = 'epsg:3857'", "no UTM zone"),
+        ("UPDATE gpkg_geometry_columns SET srs_id = 3857", "neither degrees nor"),
+        ("UPDATE gpkg_geometry_columns SET srs_id = 4326", "not within its zone"),
+        ("UPDATE boundaries SET geom = substr(geom, 1, 60)", "cut off"),
+        ("UPDATE boundaries SET geom = x'0102'", "does not begin as one"),
+        ("UPDATE baseline_paths SET lane_fid = NULL", "no lane with a baseline"),
+        ("DROP TABLE boundaries", "lacks the tables boundaries"),
+    ],
+)
+def test_damaged_maps_are_named(tmp_path, damage, message):
+    file = nuplan.write_map(tmp_path, damage=damage)
+    nuplan.write(tmp_path / "logs")
+    with pytest.raises(InputError, match=message) as error:
+        list(scenes(tmp_path / "logs"))
+    assert str(file) in str(error.value)
+
+
+def test_lanes_without_a_line_are_counted(tmp_path):
+    nuplan.write_map(tmp_path, damage="UPDATE baseline_paths SET lane_fid = NULL WHERE lane_fid = 24")
+    scene, lanes = around(nuplan.write(tmp_path / "logs"))
+    assert "24" not in lanes
+    assert scene.counts["map_lanes_incomplete"] == 1
+
+
+def test_which_map(tmp_path):
+    file = nuplan.write_map(tmp_path)
+    log = nuplan.write(tmp_path / "logs")
+    assert (
+        map_of(log, "us-nv-las-vegas-strip", "") == map_of(log, "us-nv-las-vegas-strip", str(tmp_path / "maps")) == file
+    )
+    assert map_of(log, "us-ma-boston", "") is None
+    with pytest.raises(InputError, match=r"holds no us-ma-boston"):
+        map_of(log, "us-ma-boston", str(tmp_path / "maps"))
+    for hostile in ("../../etc", "/etc", "..", "a\\b"):
+        with pytest.raises(InputError, match="no name of a folder"):
+            map_of(log, hostile, "")
+    nuplan.write_map(tmp_path / "x")
+    (tmp_path / "x/maps/us-nv-las-vegas-strip/9.15.1915").rename(file.parent.parent / "10.0")
+    with pytest.raises(InputError, match="2 versions"):
+        map_of(log, "us-nv-las-vegas-strip", "")
