@@ -13,12 +13,12 @@ import pytest
 from stylesim.corpus import Corpus
 
 
-def stylesim(*argv: object) -> str:
-    """stdout of the command; its stderr in the failure if it fails."""
+def stylesim(*argv: object, code: int = 0) -> str:
+    """stdout of the command, stderr where it shall fail; its stderr in the failure if it ends otherwise."""
     program = "from stylesim.cli import main; main()"
     done = subprocess.run([sys.executable, "-c", program, *map(str, argv)], capture_output=True, text=True, check=False)
-    assert done.returncode == 0, f"{argv}\n{done.stdout}\n{done.stderr}"
-    return done.stdout
+    assert done.returncode == code, f"{argv}\n{done.stdout}\n{done.stderr}"
+    return done.stderr if code else done.stdout
 
 
 def the_whole_way(folder: Path, scenario: str, *, condition: str, episodes: int) -> None:
@@ -28,7 +28,13 @@ def the_whole_way(folder: Path, scenario: str, *, condition: str, episodes: int)
     assert "aggressive" in stylesim("label", sim)
     stylesim("merge", sim, "--split", "0.34,0.33,0.33", "--balance", "tdbm", "--out", mixed)
     assert {info.split for info in Corpus(mixed).info} == {"train", "val", "test"}
-    stylesim("train", mixed, "--condition", condition, "--epochs", 1, "--max-steps", 3, "--out", model)
+    short = ("--epochs", 1, "--max-steps", 3)
+    rare = ("--robust", "balanced,jtt", "--augment", sim, "--augment-share", 0.25)
+    stylesim("train", mixed, "--condition", condition, *short, "--out", model)
+    said = stylesim("train", mixed, *rare, *short, "--out", folder / "robust", code=2)
+    assert "no scene to add" in said  # the mixed corpus holds the same episodes
+    stylesim("train", mixed, *rare[:2], *short, "--out", folder / "robust")
+    assert set(json.loads((folder / "robust" / "training.json").read_text())["groups"])
     said = stylesim("evaluate", "constant_velocity", model, mixed, "--by", "tdbm,scenario", "--out", folder / "report")
     assert "minFDE" in said
     assert {"report.html", "constant_velocity.json"} <= {path.name for path in (folder / "report").iterdir()}

@@ -194,6 +194,8 @@ def test_other_slips(stylesim, corpus, tmp_path):
         (["merge", corpus, "--noise", "fit", *out], 2, "recorded"),
         (["merge", corpus, corpus, *out], 2, "name it once"),
         (["train", corpus, "--size", "huge", *out], 2, "unknown model size"),
+        (["train", corpus, "--robust", "group_dor", *out], 2, "Did you mean 'group_dro'"),
+        (["train", corpus, "--augment", corpus, *out], 2, "give another one to add"),
         (["evaluate", corpus, *out], 2, "at least one forecaster"),
         (["evaluate", "constant_speed", corpus, *out], 2, "Did you mean"),
         (["evaluate", "constant_velocity", corpus, "--by", "stile", *out], 2, "unknown stratum 'stile'"),

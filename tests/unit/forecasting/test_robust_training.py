@@ -137,6 +137,11 @@ def test_no_future_is_added_that_the_test_split_holds(corpus: Corpus, more: Corp
     assert [info.scene_id for info in added.corpus.info] == ["rolled-0", "rolled-2"]
     assert {info.split for info in added.corpus.info} == {"train"}
     assert added.left_out == added.to_dict()["scenes_left_out"] == 1
+    with CorpusWriter(tmp_path / "same", source="made", configuration={"part": True}) as writer:
+        writer.add(make_scene("scene-0", n_frames=90, seed=0))  # as it is in the corpus
+        writer.add(make_scene("scene-1", n_frames=70, seed=0))  # other driving under a known id
+        same = writer.finish()
+    assert [info.scene_id for info in added_view(corpus, same, 0.3).corpus.info] == ["scene-1"]
     with pytest.raises(InputError, match="another one"):
         added_view(corpus, corpus, 0.3)
     with pytest.raises(InputError, match="augment_share"):
