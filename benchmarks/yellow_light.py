@@ -1,7 +1,7 @@
 """The decision at the yellow, executed: P(stop), decelerations and red-running of every style beside the sources.
 
     python -m benchmarks.yellow_light [--backend sumo|highway] [--seed 0] [--quick] [--approaches N] [--out FILE.json]
-                                      [--keep FILE.jsonl]
+                                      [--keep FILE.jsonl] [--others N]
 
 Single drivers come up to a light so that the time to the stop line at the onset of yellow is uniform on 1 to 6 s
 (SUMO: `benchmarks/dilemma`; highway-env: `hw_yellow_light` with the option arrivals: dilemma, on ten roads of one lane
@@ -202,15 +202,17 @@ def main() -> None:
     parser.add_argument("--backend", default="sumo", choices=("sumo", "highway"))
     parser.add_argument("--seed", type=int, default=0)
     parser.add_argument("--approaches", type=int, default=20_600, help="per style; a few are not free and left out")
+    parser.add_argument("--others", type=int, help="approaches of every set but the neutral one; as many without it")
     parser.add_argument("--quick", action="store_true", help="a twentieth of the approaches")
     parser.add_argument("--out", type=Path, help="write the figures as JSON, too")
     parser.add_argument("--keep", type=Path, help="sets that are done are kept there, and not run again")
     chosen = parser.parse_args()
     n = chosen.approaches // 20 if chosen.quick else chosen.approaches
+    other = n if chosen.others is None else chosen.others
     begun = time.process_time()
     scenario = dilemma(chosen.backend)
     backend = open_backend(chosen.backend)
-    print(f"backend {chosen.backend}, seed {chosen.seed}, {n} approaches per style; TTS uniform on 1 to 6 s")
+    print(f"backend {chosen.backend}, seed {chosen.seed}, {n} neutral approaches, {other} per style, uniform in TTS")
     sets: dict[str, Approaches] = {}
 
     def add(name: str, style: str | Population, count: int, where: Scenario = scenario) -> None:
@@ -222,14 +224,15 @@ def main() -> None:
             keep(chosen.keep, key, sets[name], counts)
         print_set(name, sets[name], counts)
 
-    for style in ("neutral", *STYLE_CLASSES[::-1]):
-        add(style, style, n)
-    some = max(n // 2, min(n, 2000))
+    add("neutral", "neutral", n)
+    for style in STYLE_CLASSES[::-1]:
+        add(style, style, other)
+    some = max(other // 2, min(other, 2000))
     add("neutral 13.9", "neutral", some, changed(scenario, speed_limit_mps=13.889, yellow_s=3.0))
     add("neutral 16.7", "neutral", some, changed(scenario, speed_limit_mps=16.667, yellow_s=4.0))
     if "wet_road" in scenario.parameters:
         add("neutral wet", "neutral", some, changed(scenario, wet_road=1.0))
-    add("naturalistic", Population.load("naturalistic"), n, changed(scenario, speed_limit_mps=13.889, yellow_s=3.0))
+    add("naturalistic", Population.load("naturalistic"), other, changed(scenario, speed_limit_mps=13.889, yellow_s=3.0))
     backend.close()
     table = style_table().parameters
     rmse: dict[str, float] = {}

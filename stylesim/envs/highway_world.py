@@ -110,7 +110,8 @@ class HighwayWorld:
     def picture(self) -> Picture:
         """The road of this episode, and a stop line for each lane that has a light."""
         assert self._traffic is not None
-        road = road_of(self._road().network, junction_nodes=self._traffic.junction_nodes)
+        network, against = self._road().network, self._road().graph.against
+        road = road_of(network, junction_nodes=self._traffic.junction_nodes, against=against)
         return Picture(road, self._lights.stop_lines_m(road))
 
     def close(self) -> None:

@@ -46,7 +46,7 @@ class HighwayBackend:
         drawn = scenario.draw(stream(seed, episode, "", "parameters"))
         crew = Crew(population, seed=seed, episode=episode, twin=plan.twin)
         traffic = traffic_of(options, drawn, crew, time_s=scenario.warm_up_s + scenario.duration_s)
-        road = road_of(traffic.road.network, junction_nodes=traffic.junction_nodes)
+        road = road_of(traffic.road.network, junction_nodes=traffic.junction_nodes, against=traffic.road.graph.against)
         check_possible(plan, road, scenario.name)
         tries = attempts(plan, seed=seed, episode=episode, duration_s=scenario.duration_s)
         stressing = Stressing(traffic, crew, road, list(tries))

@@ -36,6 +36,7 @@ class LaneGraph:
         lanes = network.lanes_dict()
         self.length_m = {index: float(lane.length) for index, lane in lanes.items()}
         self.beside = {index[:2]: len(network.graph[index[0]][index[1]]) for index in lanes}
+        self.against: frozenset[LaneIndex] = frozenset()  # lanes for overtaking; set by the site
         self.winds = any(bend_radius_m(lane) < math.inf for lane in lanes.values())
         self.after: dict[LaneIndex, tuple[LaneIndex, ...]] = {
             index: tuple(other for other in lanes if other[0] == index[1] and joins(lane, lanes[other]))

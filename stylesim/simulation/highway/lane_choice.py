@@ -12,6 +12,8 @@ from typing import Any
 
 from stylesim.simulation.highway.following import LEAST_GAP_M
 from stylesim.simulation.highway.graph import LaneGraph, LaneIndex
+from stylesim.simulation.highway.overtaking import choose_to_pass
+from stylesim.simulation.highway.two_way import PASSING
 
 MOBIL_GAIN_MPS2 = 0.2  # highway-env's threshold, an average driver's
 MOBIL_SAFE_MPS2 = 2.0  # highway-env's imposed braking, an average driver's
@@ -69,6 +71,9 @@ def must_change(car: Any) -> tuple[int, float]:
 def choose_lane(car: Any) -> None:
     """Change the car's target lane where that pays, or where it must; takes back a change that somebody else makes."""
     road = car.road
+    if (*car.target_lane_index[:2], PASSING) in road.graph.against:
+        choose_to_pass(car)
+        return
     if car.lane_index != car.target_lane_index:
         if car.lane_index[:2] == car.target_lane_index[:2]:
             _give_way(car)

@@ -7,6 +7,7 @@ y and every angle change sign; then left is left, and lane i + 1 is the right ne
 from __future__ import annotations
 
 import math
+from collections.abc import Collection
 from typing import Any
 
 import numpy as np
@@ -15,7 +16,7 @@ from highway_env.road.road import RoadNetwork
 from jaxtyping import Float
 
 from stylesim.road import Lane, Road
-from stylesim.simulation.highway.graph import LaneGraph
+from stylesim.simulation.highway.graph import LaneGraph, LaneIndex
 
 STRAIGHT_M = 20.0  # spacing of centre line points: straights
 CURVED_M = 1.0  # and everything else; the error on a curve of radius 9 m is then 1.4 cm
@@ -36,13 +37,16 @@ def _side(lane: Any, along: Float[np.ndarray, " point"], share: float) -> Float[
     return flipped(np.array([lane.position(s, share * lane.width_at(s)) for s in along]))
 
 
-def road_of(network: RoadNetwork, *, junction_nodes: str = "") -> Road:
+def road_of(network: RoadNetwork, *, junction_nodes: str = "", against: Collection[LaneIndex] = ()) -> Road:
     """Every lane of the network; a lane whose nodes both start with `junction_nodes` lies inside the junction.
 
-    Lanes that lead into the junction get a stop line at their end.
+    Lanes that lead into the junction get a stop line at their end. Lanes `against` the oncoming traffic are left out,
+    because they are the other direction's.
     """
     lanes, graph = [], LaneGraph(network)
     for index, lane in network.lanes_dict().items():
+        if index in against:
+            continue
         start, end, number = index
         spacing = STRAIGHT_M if isinstance(lane, StraightLane) and not isinstance(lane, SineLane) else CURVED_M
         along = np.linspace(0.0, lane.length, max(2, math.ceil(lane.length / spacing) + 1))
@@ -59,7 +63,9 @@ def road_of(network: RoadNetwork, *, junction_nodes: str = "") -> Road:
                 left_boundary_m=left,
                 right_boundary_m=right,
                 successors=tuple(lane_id(other) for other in graph.after[index]),
-                left_neighbour=lane_id((start, end, number - 1)) if number > 0 else "",
+                left_neighbour=lane_id((start, end, number - 1))
+                if number > 0 and (start, end, number - 1) not in against
+                else "",
                 right_neighbour=lane_id((start, end, number + 1)) if number + 1 < beside else "",
                 in_junction=inside,
                 stop_line_m=np.stack([left[-1], right[-1]]) if enters else None,

@@ -11,11 +11,13 @@ from stylesim.simulation.highway.roundabout import roundabout_site
 from stylesim.simulation.highway.sites import Site, exit_site, merge_site
 from stylesim.simulation.highway.spec import HighwayOptions
 from stylesim.simulation.highway.traffic import Crew, Traffic, highway_traffic
+from stylesim.simulation.highway.two_way import two_way_site
 
 SITES: dict[str, Callable[[Mapping[str, float]], Site]] = {
     "merge": merge_site,
     "exit": exit_site,
     "roundabout": roundabout_site,
+    "two_way": two_way_site,
     "yellow_light": yellow_light_site,
 }
 

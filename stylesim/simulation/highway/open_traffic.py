@@ -34,6 +34,7 @@ class OpenTraffic(Traffic):
 
     def __init__(self, site: Site, options: HighwayOptions, crew: Crew, *, time_s: float) -> None:
         road = StyledRoad(network=site.network, np_random=crew.stream("road"))
+        road.graph.against = site.against
         super().__init__(road, crew, options)
         self.junction_nodes = site.junction_nodes
         self._site = site

@@ -34,7 +34,7 @@ class PlannedEgo:
 
     def __init__(self, traffic: Traffic, entry_point: str, *, name: str, seed: int, episode: int) -> None:
         self._traffic = traffic
-        road = road_of(traffic.road.network, junction_nodes=traffic.junction_nodes)
+        road = road_of(traffic.road.network, junction_nodes=traffic.junction_nodes, against=traffic.road.graph.against)
         scene_id = f"{name}-{seed}-{episode:05d}"
         signals = traffic.signals()
         lights = ((), ()) if signals is None else (signals.signal_id, signals.lane_id)

@@ -20,6 +20,8 @@ from stylesim.simulation.highway.quick import quicken
 
 LOOK_AHEAD_M = 200.0  # chosen: beyond it a leader changes the IDM's acceleration by less than 0.1 m/s2
 LOOK_BACK_M = 100.0  # chosen, as for leaders in REFERENCE section 1
+MEETS_S = 2.5  # chosen: who comes on one's own lane is braked for when it is nearer than that
+MEETS_PASSING_S = 1.0  # and by who overtakes, because it means to be back by then
 NOBODY = (None, math.inf)
 
 
@@ -131,8 +133,9 @@ class StyledRoad(Road):  # type: ignore[misc]
         here = self.place(vehicle, lane_index)[0]
         places, cars = self._occupants(lane_index)
         for number in range(bisect_left(places, here), len(cars)):
-            if cars[number] is not vehicle:
-                return cars[number], places[number] - here - (cars[number].LENGTH + vehicle.LENGTH) / 2
+            gap = places[number] - here - (cars[number].LENGTH + vehicle.LENGTH) / 2
+            if cars[number] is not vehicle and not self._comes_later(vehicle, lane_index, cars[number], gap):
+                return cars[number], gap
         lanes, index = self._projection, lane_index
         start = lanes.length_m[lanes.number[index]] - here
         for _ in range(LANES_AHEAD):
@@ -162,7 +165,7 @@ class StyledRoad(Road):  # type: ignore[misc]
         here = self.place(vehicle, lane_index)[0]
         places, cars = self._occupants(lane_index)
         for number in range(bisect_left(places, here) - 1, -1, -1):
-            if cars[number] is not vehicle:
+            if cars[number] is not vehicle and not self._comes(lane_index, cars[number]):
                 return cars[number], here - places[number] - (cars[number].LENGTH + vehicle.LENGTH) / 2
         nearest: tuple[Any, float] = NOBODY
         for index in self.graph.before[lane_index] if here <= LOOK_BACK_M else ():
@@ -181,6 +184,24 @@ class StyledRoad(Road):  # type: ignore[misc]
             self._refresh()
         places, cars = self._occupants(lane_index)
         return (cars[0], places[0]) if cars else NOBODY
+
+    def occupants(self, lane_index: LaneIndex) -> list[tuple[float, Any, bool]]:
+        """(place along it in m, car, whether it drives its way) of who is on the lane or changing onto it, in order."""
+        places, cars = self._occupants(lane_index)
+        return [(place, car, not self._comes(lane_index, car)) for place, car in zip(places, cars, strict=True)]
+
+    def _comes(self, lane_index: LaneIndex, car: Any) -> bool:
+        """Whether the car drives the other way, where somebody may."""
+        if not self.graph.against:
+            return False
+        return not self._projection.aligned(self._projection.number[lane_index], self._column[id(car)], math.pi / 2)
+
+    def _comes_later(self, vehicle: Any, lane_index: LaneIndex, car: Any, gap_m: float) -> bool:
+        """Whether the car comes the other way, and is too far away to brake for."""
+        if not self._comes(lane_index, car):
+            return False
+        own = lane_index not in self.graph.against or getattr(vehicle, "falls_back", False)
+        return bool(gap_m > (MEETS_S if own else MEETS_PASSING_S) * (vehicle.speed + car.speed))
 
     def changing_onto(self, lane_index: LaneIndex) -> list[Any]:
         """The cars on that lane, and those that are about to be."""

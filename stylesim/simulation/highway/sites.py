@@ -13,7 +13,7 @@ from typing import Any
 from highway_env.road.lane import AbstractLane, LineType, SineLane, StraightLane
 from highway_env.road.road import RoadNetwork
 
-from stylesim.simulation.highway.graph import LaneGraph
+from stylesim.simulation.highway.graph import LaneGraph, LaneIndex
 from stylesim.simulation.highway.lights import Programme
 
 LANE_M = StraightLane.DEFAULT_WIDTH
@@ -46,6 +46,7 @@ class Site:
     junction_nodes: str = ""
     light: Programme | None = None  # at the end of the lanes that lead into the junction
     last_entry_s: float = 27.0  # nobody enters later than that before the end: everybody is seen for 20 s or more
+    against: frozenset[LaneIndex] = frozenset()  # lanes for overtaking, which lie on the lanes of who comes
     rule: Callable[[LaneGraph], Any] | None = None  # who must wait there; `assign(cars)` sets their `waits_for_gap`
 
 

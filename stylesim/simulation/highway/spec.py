@@ -12,7 +12,7 @@ from stylesim.specs import Spec, parse
 
 LOG_HZ = 10  # everything in a corpus is at 0.1 s
 
-Layout = Literal["highway", "intersection", "merge", "exit", "roundabout", "yellow_light"]
+Layout = Literal["highway", "intersection", "merge", "exit", "roundabout", "two_way", "yellow_light"]
 
 PARAMETERS: dict[str, tuple[str, ...]] = {
     "highway": ("density_per_km_lane", "lanes", "speed_limit_mps"),
@@ -20,6 +20,7 @@ PARAMETERS: dict[str, tuple[str, ...]] = {
     "merge": ("density_per_km_lane", "lanes", "ramp_share", "speed_limit_mps"),
     "exit": ("density_per_km_lane", "exit_share", "lanes", "speed_limit_mps"),
     "roundabout": ("demand_vph", "speed_limit_mps"),
+    "two_way": ("demand_vph", "speed_limit_mps"),
     "yellow_light": ("demand_vph", "green_s", "red_s", "speed_limit_mps", "yellow_s"),
 }
 MAY_BE_ZERO = ("spawn_per_s", "ramp_share", "exit_share")

@@ -77,6 +77,8 @@ class Stressing:
             index = car.lane_index
             if car.style is None or car.crashed or index != car.target_lane_index or lane_id(index) in inside:
                 continue
+            if index in road.graph.against:
+                continue
             front = road.place(car, index)[0] + car.LENGTH / 2
             found.append(_Place(car, index, front, road.graph.length_m[index] - front))
         return found
@@ -133,6 +135,8 @@ class Stressing:
     def _cut_in(self, attempt: Attempt, place: _Place, now_s: float) -> Act | None:
         car, road, gap_s = place.car, self.traffic.road, attempt.numbers["gap_s"]
         for index in road.network.side_lanes(place.index):
+            if index in road.graph.against:
+                continue
             (rear, back), (front, ahead) = road.behind(car, index), road.ahead(car, index)
             if not isinstance(rear, StyledVehicle) or rear.driver_id in self._busy:
                 continue

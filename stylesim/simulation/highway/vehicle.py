@@ -13,6 +13,7 @@ from highway_env.vehicle.kinematics import Vehicle
 from stylesim.simulation.highway.following import behind_leader, free_road
 from stylesim.simulation.highway.lane_choice import Needs, choose_lane, must_change
 from stylesim.simulation.highway.noise import Wander
+from stylesim.simulation.highway.overtaking import FALLS_BACK_MPS2
 from stylesim.simulation.highway.path import braking_to_yield_mps2, curve_speed_mps
 from stylesim.simulation.highway.pedal import TYRES_MPS2, Pedal
 from stylesim.simulation.highway.steering import LATERAL_MPS2, WHEEL_RAD, LaneKeeping, steering_rad, turned_wheel_rad
@@ -23,6 +24,7 @@ UNKNOWN_LIMIT_MPS = 20.0  # highway-env's default, for lanes of users that have 
 LANE_WIDTH_M = 4.0  # highway-env's; what wander may use of it depends on the car's width
 OTHERS_HEADWAY_S = 1.5  # of others one expects what the neutral driver keeps, at most (agents/styles.yaml)
 KERB_M = 0.2  # what wander leaves between the car's side and the lane's edge
+PULLS_OUT_S = 0.4  # chosen: who pulls out is closer than it would follow, and not for long
 LANE_END_M = 15.0  # chosen: who must stop at the end of its lane leaves that much to pull away
 
 
@@ -56,6 +58,9 @@ class StyledVehicle(IDMVehicle):  # type: ignore[misc]
         self.lateral_mps2 = LATERAL_MPS2  # accepted now
         self.event_mps2 = math.inf  # a stressor: it accelerates no more than that
         self.runs = False  # a stressor: it drives on whatever light and right of way say
+        self.passing_mps = 0.0  # the speed that it wishes while it overtakes; 0 while it does not
+        self.passes: StyledVehicle | None = None  # the last one that it means to pass
+        self.falls_back = False  # it overtakes no more, but waits for room behind whom it wanted to pass
         self._wheel_rad = 0.0
         self._was_yielding = False
         self._hesitation_s = 0.0
@@ -91,7 +96,7 @@ class StyledVehicle(IDMVehicle):  # type: ignore[misc]
         yields = self.waits_for_gap or self._hesitation_s > 0 or getattr(self, "is_yielding", False)
         if yields and not self.runs:
             return 0.0
-        limit = self.free_wish_mps * self.flow_ratio
+        limit = max(self.free_wish_mps * self.flow_ratio, self.passing_mps)
         if not self.road.graph.winds:
             return limit
         return min(limit, curve_speed_mps(self, self.style.comfortable_deceleration_mps2))
@@ -120,7 +125,10 @@ class StyledVehicle(IDMVehicle):  # type: ignore[misc]
         self.follow_road()
         if self.enable_lane_change:
             choose_lane(self)
-        acceleration = self.judged(self, *self.road.ahead(self, self.lane_index))
+        passes = self.passing_mps > 0.0 and not self.falls_back
+        acceleration = self.judged(self, *self.road.ahead(self, self.lane_index), pulls_out=passes)
+        if self.falls_back:
+            acceleration = min(acceleration, -FALLS_BACK_MPS2)
         if self.target_lane_index != self.lane_index:
             onto = self.judged(self, *self.road.ahead(self, self.target_lane_index))
             acceleration = min(acceleration, onto)
@@ -136,8 +144,11 @@ class StyledVehicle(IDMVehicle):  # type: ignore[misc]
         self.enable_lane_change = False
         self.target_lane_index = index
 
-    def judged(self, car: Any, leader: Any, gap_m: float) -> float:
-        """IDM acceleration of `car` behind `leader` as this driver would drive it, with its own patience, m/s2."""
+    def judged(self, car: Any, leader: Any, gap_m: float, *, pulls_out: bool = False) -> float:
+        """IDM acceleration of `car` behind `leader` as this driver would drive it, with its own patience, m/s2.
+
+        Who `pulls_out` to pass the leader follows it closely meanwhile.
+        """
         style = cast(DriverStyle, self.style)
         bold, ease = style.max_acceleration_mps2, style.comfortable_deceleration_mps2
         speed = max(car.speed, 0.0)
@@ -156,7 +167,11 @@ class StyledVehicle(IDMVehicle):  # type: ignore[misc]
                 leader.speed * turned,
                 getattr(leader, "acceleration_mps2", 0.0) * turned,
                 gap_m,
-                headway_s=style.time_headway_s if car is self else min(style.time_headway_s, OTHERS_HEADWAY_S),
+                headway_s=PULLS_OUT_S
+                if pulls_out
+                else style.time_headway_s
+                if car is self
+                else min(style.time_headway_s, OTHERS_HEADWAY_S),
                 standing_m=style.min_gap_m,
                 bold=bold,
                 ease=ease,
