@@ -111,7 +111,7 @@ def test_the_lane_for_overtaking_is_the_other_directions():
 
 
 def test_bold_drivers_overtake_in_the_scenario_and_nobody_is_hit():
-    scenario = load_scenario("hw_two_way").model_copy(update={"duration_s": 30.0})
+    scenario = load_scenario("hw_two_way").model_copy(update={"duration_s": 50.0})
     crowd = Population.of(aggressive=0.5, cautious=0.5)
     scene = HighwayBackend().run_episode(scenario, crowd, seed=3, episode=2)
     tracks = scene.tracks
