@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
-from typing import Protocol, runtime_checkable
+from typing import Any, Protocol, runtime_checkable
 
 import numpy as np
 from jaxtyping import Bool, Float, Int
@@ -99,6 +99,33 @@ class Oracle(Protocol):
     def reveal(self, scenes: Iterable[Scene]) -> None:
         """Take the truth of these scenes, whole ones."""
         ...
+
+
+@runtime_checkable
+class Conditioned(Protocol):
+    """A forecaster that is told of each driver's style, and can be told otherwise; it is only with some `styles`."""
+
+    @property
+    def styles(self) -> tuple[str, ...]:
+        """The styles that it knows; () where it is told nothing."""
+        ...
+
+    def style_cond(self, task: ForecastTask) -> Any:
+        """What it is told of each driver of a task: an array with a row for each."""
+        ...
+
+    def contexts(self, task: ForecastTask) -> Int[np.ndarray, " driver"]:
+        """The road context of each driver of a task (0 elsewhere, 1 highway)."""
+        ...
+
+    def predict_given(self, tasks: Sequence[ForecastTask], cond: Sequence[Any]) -> list[Forecast]:
+        """As `predict`, told what `cond` says: rows as `style_cond` gives them, for each task."""
+        ...
+
+
+def is_told(forecaster: object) -> bool:
+    """True for a forecaster that is told of each driver's style."""
+    return isinstance(forecaster, Conditioned) and bool(forecaster.styles)
 
 
 def horizon_s(forecaster: Forecaster) -> float:

@@ -25,7 +25,7 @@ class PopulationSpec(Spec):
     about: str
     source: str = Field(min_length=3)
     shares: dict[str, float]
-    within_class: Literal["interval", "centre", "neutral"] = "interval"
+    within_class: Literal["interval", "centre", "neutral", "placebo"] = "interval"
 
 
 def check_shares(shares: Mapping[str, float], *, where: str) -> dict[str, float]:
@@ -46,6 +46,7 @@ class Population:
     """Shares of the six classes; within a class the knob is drawn from its whole interval (or its centre).
 
     `within_class="neutral"` puts everybody at knob 0 (the reference that scalers are fitted on), whatever the shares.
+    "placebo" does so too but draws a class for each: a world in which the commanded style has no effect.
     `calibration` is a file of `stylesim calibrate` to drive by, in place of what ships for the backend.
     """
 
@@ -120,6 +121,8 @@ class Population:
         if self.within_class == "neutral":
             return replace(table.at(0.0, rng), name="neutral")
         name = STYLE_CLASSES[int(rng.choice(len(self.shares), p=np.array(self.shares) / sum(self.shares)))]
+        if self.within_class == "placebo":
+            return replace(table.at(0.0, rng), name=name)
         low, high = CLASS_INTERVAL[name]
         knob = CLASS_KNOB[name] if self.within_class == "centre" else float(rng.uniform(low, high))
         return table.at(knob, rng, limit_mps=limit_mps)

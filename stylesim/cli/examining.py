@@ -46,6 +46,7 @@ def compare(
 
 def show_comparison(found: Comparison) -> None:
     """Every table on stdout."""
+    from stylesim.evaluation.permuted import placebo_row
     from stylesim.evaluation.results import HEADINGS, interval_text
     from stylesim.evaluation.slices import ALL
     from stylesim.evaluation.stress_decisions import MEASURES
@@ -78,6 +79,10 @@ def show_comparison(found: Comparison) -> None:
         show_table(
             "Beside each other, not paired", ("", "figure", found.ours.forecaster, found.theirs.forecaster), rows
         )
+    for one in (found.ours, found.theirs):
+        if row := placebo_row(one):
+            placebo, told = (interval_text(metrics["min_fde_m"]) for metrics in (row, one.overall.metrics))
+            say(f"{one.forecaster}: minFDE {told} m; told other drivers' styles (placebo) {placebo} m")
 
 
 def conformal(

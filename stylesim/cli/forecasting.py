@@ -141,6 +141,9 @@ def evaluate(
     history: float = typer.Option(5.0, min=0.1, help="Seconds of history that the forecasters see."),
     future: float = typer.Option(6.0, min=0.1, help="Seconds to forecast; cut to the shortest horizon among them."),
     stride: float = typer.Option(3.0, min=0.1, help="Seconds from one t0 of a scene to the next."),
+    placebo: bool = typer.Option(
+        True, help="Ask a model that is told of styles once more with the styles of other drivers."
+    ),
     seed: int = typer.Option(0, min=0, help="Of the bootstrap."),
     out: Path = typer.Option(..., "--out", help="Folder of the report; must not exist."),
 ) -> None:
@@ -174,7 +177,7 @@ def evaluate(
     if not strata:
         raise InputError("--by: name at least one stratum, such as tdbm or scenario")
     with progress_bar("evaluating", "scenes") as bar:
-        report = run(models, view, by=strata, spec=spec, seed=seed, progress=_by_forecaster(bar))
+        report = run(models, view, by=strata, spec=spec, seed=seed, placebo=placebo, progress=_by_forecaster(bar))
     _save(report, partial, final)
     for stratum in strata:
         table = error_table(report.evaluations, stratum)

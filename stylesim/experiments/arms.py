@@ -14,6 +14,7 @@ from stylesim.corpus.files import json_bytes, write_whole
 from stylesim.errors import InputError
 from stylesim.windows import WindowSpec
 
+PERMUTED_ARM = "+permuted"
 NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9_+-]*")
 REQUEST_FILE = "experiment.json"
 FORMAT, SCHEMA_VERSION = "stylesim-experiment", 1
@@ -22,11 +23,15 @@ SET_BY_RUNNER = frozenset({"seed", "out", "spec", "size", "max_steps", "epochs",
 
 @dataclass(frozen=True)
 class Arm:
-    """One way of training: `options` go to `stylesim.train`, on `corpus` (None: the experiment's own)."""
+    """One way of training: `options` go to `stylesim.train`, on `corpus` (None: the experiment's own).
+
+    `permuted` also evaluates each model with the styles that it is told permuted, as the arm "NAME+permuted".
+    """
 
     name: str
     options: Mapping[str, Any] = field(default_factory=dict)
     corpus: Corpus | None = None
+    permuted: bool = False
 
     def __post_init__(self) -> None:
         """Refuse names that make no file name, and options that are the same in all arms."""

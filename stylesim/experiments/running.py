@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -12,9 +12,10 @@ import polars as pl
 
 from stylesim.corpus import Corpus
 from stylesim.errors import InputError
-from stylesim.experiments.arms import Arm, Request, check_arms
+from stylesim.experiments.arms import PERMUTED_ARM, Arm, Request, check_arms
 from stylesim.experiments.records import Run, read_runs, write_run
 from stylesim.experiments.results import Experiment
+from stylesim.forecast import Forecaster
 from stylesim.windows import WindowSpec
 
 MODELS = "models"
@@ -63,8 +64,7 @@ def run_experiment(
     for number, (seed, arm) in enumerate(todo, start=total - len(todo)):
         if progress is not None:
             progress(f"{arm.name}, seed {seed}", number, total)
-        measured, tables = _one(arm, seed, request, arm.corpus or corpus, judged, out, cache)
-        write_run(out, Run(arm.name, seed, arm.facts(), measured), tables)
+        _one(arm, seed, request, arm.corpus or corpus, judged, out, cache)
     if progress is not None:
         progress("done", total, total)
     return Experiment.load(out)
@@ -79,11 +79,9 @@ def _same(arm: Arm, runs: Sequence[Run], out: Path) -> None:
             )
 
 
-def _one(
-    arm: Arm, seed: int, request: Request, corpus: Corpus, judged: Corpus, out: Path, cache: Path | None
-) -> tuple[dict[str, Any], dict[str, pl.DataFrame]]:
-    """One run: what was measured of it, and its drivers per split."""
-    from stylesim.evaluation.evaluate import evaluate
+def _one(arm: Arm, seed: int, request: Request, corpus: Corpus, judged: Corpus, out: Path, cache: Path | None) -> None:
+    """Train one arm with one seed, evaluate it, and write what came of it; the arm's own line last."""
+    from stylesim.evaluation.permuted import permuted
     from stylesim.forecasting.checkpoint import RECORD_FILE
     from stylesim.forecasting.training import train
 
@@ -103,13 +101,6 @@ def _one(
         cache=cache,
         resume=True,
     )
-    trained_s, trained_cpu_s = time.perf_counter(), time.process_time()
-    tables, means = {}, {}
-    for split in request.splits:
-        found = evaluate(model, judged, by=(), spec=request.spec, split=split)
-        tables[split] = found.drivers
-        moving = found.drivers.filter(pl.col("n_windows") > 0)
-        means[split] = {"drivers": moving.height, "min_fde_m": moving["min_fde_m"].mean()}
     record = json.loads((folder / RECORD_FILE).read_bytes())
     measured = {
         "steps": int(record["curve"][-1]["step"]),
@@ -117,9 +108,29 @@ def _one(
         "best_epoch": int(record["best_epoch"]),
         "style_effect_m": record["curve"][record["best_epoch"]].get("style_effect_m"),
         "training_samples": int(record["samples"]["train"]),
-        "train_s": trained_s - begin_s,
-        "train_cpu_s": trained_cpu_s - begin_cpu_s,
-        "evaluate_cpu_s": time.process_time() - trained_cpu_s,
-        "means": means,
+        "train_s": time.perf_counter() - begin_s,
+        "train_cpu_s": time.process_time() - begin_cpu_s,
     }
-    return measured, tables
+    if arm.permuted:
+        by_split = {
+            split: permuted(model, judged.split(split), spec=request.spec, seed=seed) for split in request.splits
+        }
+        found, tables = _judged(by_split, request, judged)
+        write_run(out, Run(f"{arm.name}{PERMUTED_ARM}", seed, arm.facts(), measured | found), tables)
+    found, tables = _judged(dict.fromkeys(request.splits, model), request, judged)
+    write_run(out, Run(arm.name, seed, arm.facts(), measured | found), tables)
+
+
+def _judged(
+    models: Mapping[str, Forecaster], request: Request, judged: Corpus
+) -> tuple[dict[str, Any], dict[str, pl.DataFrame]]:
+    """What was measured of the forecaster of each split, and its drivers."""
+    from stylesim.evaluation.evaluate import evaluate
+
+    begin_cpu_s = time.process_time()
+    tables, means = {}, {}
+    for split, model in models.items():
+        tables[split] = evaluate(model, judged, by=(), spec=request.spec, split=split).drivers
+        moving = tables[split].filter(pl.col("n_windows") > 0)
+        means[split] = {"drivers": moving.height, "min_fde_m": moving["min_fde_m"].mean()}
+    return {"evaluate_cpu_s": time.process_time() - begin_cpu_s, "means": means}, tables

@@ -6,7 +6,7 @@ from collections.abc import Iterable, Mapping, Sequence
 
 import numpy as np
 import torch
-from jaxtyping import Float32
+from jaxtyping import Float32, Int64
 
 from stylesim.errors import InputError, unknown
 from stylesim.forecast import Forecast, ForecastTask
@@ -124,6 +124,12 @@ class TrainedForecaster:
             averaged([answers[i] for answers in by_style], weight, count=count, apart_m=apart_m)
             for i, (_, weight) in enumerate(asked)
         ]
+
+    def contexts(self, task: ForecastTask) -> Int64[np.ndarray, " driver"]:
+        """The road context of each driver, as the labellers see it in the history: 0 elsewhere, 1 highway."""
+        if self.conditioner is None:
+            return np.zeros(len(task.agent_index), np.int64)
+        return self.conditioner.judges.measure(task.scene, task.agent_index).highway
 
     def predict_given(self, tasks: Sequence[ForecastTask], cond: Sequence[StyleCond]) -> list[Forecast]:
         """As `predict`, the style being what `cond` says of the drivers of each task (rows as of `style_cond`)."""

@@ -12,7 +12,7 @@ from stylesim.errors import InputError
 from stylesim.forecasting.conditions import SEES_FUTURE
 from stylesim.labels import UNDETERMINED
 from stylesim.scene import Scene
-from stylesim.style import class_of_knob
+from stylesim.style import STYLE_CLASSES, DriverStyle, class_of_knob
 
 TrueStyles = Mapping[tuple[str, str], int]  # (scene id, agent id) to the number of the class, or UNDETERMINED
 
@@ -44,7 +44,8 @@ class Truth:
         found = np.full(tracks.n_agents, UNDETERMINED, np.int64)
         if self._commanded:
             for agent, driver in enumerate(tracks.driver):
-                if driver is not None and (name := class_of_knob(driver.aggressiveness)) in self._classes:
+                name = None if driver is None else _class_of(driver)
+                if name in self._classes:
                     found[agent] = self._classes.index(name)
         asked = np.flatnonzero(tracks.is_motor & tracks.valid.any(axis=1) & (found == UNDETERMINED)).astype(np.int32)
         if len(asked) and isinstance(self._judges, TrackJudges):
@@ -58,6 +59,11 @@ class Truth:
             names = scene.tracks.agent_id
             table.update(zip(((scene.scene_id, name) for name in names), self.of_scene(scene).tolist(), strict=True))
         return table
+
+
+def _class_of(driver: DriverStyle) -> str:
+    """The class that was commanded; that of his place on the knob for a driver without one (neutral)."""
+    return driver.name if driver.name in STYLE_CLASSES else class_of_knob(driver.aggressiveness)
 
 
 def looked_up(

@@ -12,8 +12,9 @@ from stylesim.corpus import Corpus
 from stylesim.errors import InputError
 from stylesim.evaluation import evaluate as one_forecaster
 from stylesim.evaluation.metrics import MODES
+from stylesim.evaluation.permuted import permuted, with_placebo_row
 from stylesim.evaluation.results import Evaluation, markdown
-from stylesim.forecast import Forecaster
+from stylesim.forecast import Forecaster, is_told
 from stylesim.report.figures import Curve
 from stylesim.report.html import build_report
 from stylesim.windows import WindowSpec
@@ -68,10 +69,14 @@ def evaluate(
     seed: int = 0,
     modes: int = MODES,
     within_site: bool = True,
+    placebo: bool = True,
     progress: Callable[[str, int, int], None] | None = None,
 ) -> Report:
     """Errors of every forecaster by style and scenario; see `stylesim.evaluation.evaluate` for `by` and what is raised.
 
+    Beside another forecaster, one that is told of each driver's style is evaluated once more with the styles that it is
+    told permuted within scenario and context (`evaluation.permuted`): a gain that stays is not from the styles.
+    `placebo=False` leaves that out.
     A forecaster that has `training_curve` brings its loss curve into the report. `progress` is called with the
     forecaster's name, the scenes done and their number. InputError if there is none, or two have one name.
     """
@@ -82,20 +87,27 @@ def evaluate(
     if len(set(names)) < len(names):
         raise InputError(f"two forecasters have the same name: {', '.join(names)}")
     view = corpus if split is None else corpus.split(split)
+    judged_spec = one_forecaster.common_spec(several, spec or WindowSpec())
+    evaluations: list[Evaluation] = []
     # all get the same questions: what one of them cannot answer, none is asked
-    evaluations = tuple(
-        one_forecaster.evaluate(
-            forecaster,
-            view,
-            beside=several,
-            by=tuple(by),
-            spec=spec,
-            seed=seed,
-            modes=modes,
-            within_site=within_site,
-            progress=None if progress is None else partial(progress, forecaster.name),
-        )
-        for forecaster in several
-    )
+    for forecaster in several:
+        shown: list[Forecaster] = [forecaster]
+        if placebo and len(several) > 1 and is_told(forecaster):
+            shown.append(permuted(forecaster, view, spec=judged_spec, seed=seed, beside=several))
+        found = [
+            one_forecaster.evaluate(
+                one,
+                view,
+                beside=several,
+                by=tuple(by),
+                spec=spec,
+                seed=seed,
+                modes=modes,
+                within_site=within_site,
+                progress=None if progress is None else partial(progress, one.name),
+            )
+            for one in shown
+        ]
+        evaluations += [with_placebo_row(*found) if len(found) > 1 else found[0], *found[1:]]
     curves = {forecaster.name: getattr(forecaster, "training_curve", ()) for forecaster in several}
-    return Report(evaluations, view, {name: curve for name, curve in curves.items() if curve}, seed)
+    return Report(tuple(evaluations), view, {name: curve for name, curve in curves.items() if curve}, seed)

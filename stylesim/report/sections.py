@@ -6,8 +6,10 @@ import json
 from collections.abc import Mapping, Sequence
 
 from stylesim.corpus import Corpus
+from stylesim.evaluation.compare import differences
 from stylesim.evaluation.evaluate import corpus_facts
 from stylesim.evaluation.intervals import Estimate
+from stylesim.evaluation.permuted import PERMUTED
 from stylesim.evaluation.results import HEADINGS, Evaluation
 from stylesim.evaluation.slices import ALL, LAST, STANDING
 from stylesim.evaluation.strata import title_of
@@ -24,7 +26,9 @@ DEFINITIONS = (
     "A driver counts once, with the mean of its windows. Intervals resample units (a recording at one site, or an "
     "episode), then drivers. A cell of fewer than 30 drivers is refused; with fewer than 3 units the interval "
     "resamples drivers only, is marked † (within site), and says nothing about other sites. A class of the whole "
-    "track has seen the future: it sorts drivers here and is never given to a forecaster."
+    "track has seen the future: it sorts drivers here and is never given to a forecaster. “labels permuted” is the "
+    "same forecaster told the styles of other drivers of the same scenario and context: what it still gains is not "
+    "from the styles."
 )
 
 
@@ -84,8 +88,28 @@ def warnings(evaluations: Sequence[Evaluation]) -> list[str]:
             found.append(
                 f"{one.forecaster} was evaluated on scenes of the split(s) {', '.join(seen)}, not on test alone."
             )
+    found += placebo_warnings(evaluations)
     if len({one.about["corpus"]["fingerprint"] for one in evaluations}) > 1:
         found.append("The forecasters were evaluated on different corpora; only those of the first one's are paired.")
+    return found
+
+
+def placebo_warnings(evaluations: Sequence[Evaluation]) -> list[str]:
+    """Forecasters told somebody else's styles that are nevertheless better than one that is told none."""
+    found = []
+    placebos = [one for one in evaluations if one.forecaster.endswith(f"({PERMUTED})")]
+    told = {one.forecaster.removesuffix(f" ({PERMUTED})") for one in placebos}
+    plain = [one for one in evaluations if one not in placebos and one.forecaster not in told]
+    for placebo in placebos:
+        for base in plain:
+            if placebo.about["corpus"]["fingerprint"] != base.about["corpus"]["fingerprint"]:
+                continue
+            gap = differences(placebo, base, ALL)[ALL]["min_fde_m"]
+            if not gap.refused and gap.high < 0:
+                found.append(
+                    f"{placebo.forecaster} is better than {base.forecaster} by {-gap.value:.2f} m minFDE although its "
+                    "styles are those of other drivers: that much of the gain is not from the styles."
+                )
     return found
 
 

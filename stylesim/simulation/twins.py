@@ -58,7 +58,8 @@ def twins_of(
     rng = stream(seed, episode, driver_id, "twin style")
     others = [name for name in STYLE_CLASSES if name != own.name]
     name = request.style or others[int(rng.integers(len(others)))]
-    crowd = replace(population.reweighted(**{name: 1.0}), within_class="interval")
+    within = "placebo" if population.within_class == "placebo" else "interval"
+    crowd = replace(population.reweighted(**{name: 1.0}), within_class=within)
     style = crowd.draw(rng, backend=backend, limit_mps=scene.parameters.get("speed_limit_mps"))
     twin = Twin(name=TWIN, driver=driver_id, style=style, from_style=own.name, at_s=request.at_s)
     null = twin.model_copy(update={"name": NULL, "style": own, "new_noise": True})

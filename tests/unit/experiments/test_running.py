@@ -33,7 +33,7 @@ def corpus(tmp_path_factory: pytest.TempPathFactory) -> Corpus:
 
 
 def arms(corpus: Corpus) -> list[Arm]:
-    return [Arm("none"), Arm("told", {"condition": "tdbm", "judges": Told(corpus, leaks=False)})]
+    return [Arm("none"), Arm("told", {"condition": "tdbm", "judges": Told(corpus, leaks=False)}, permuted=True)]
 
 
 def run(corpus: Corpus, out: Path, **changes: Any) -> Experiment:
@@ -51,7 +51,8 @@ def finished(corpus: Corpus, tmp_path_factory: pytest.TempPathFactory) -> Experi
 
 
 def test_every_arm_with_every_seed(finished: Experiment) -> None:
-    assert [r.key for r in finished.runs] == [("none", 0), ("none", 1), ("told", 0), ("told", 1)]
+    assert [r.key for r in finished.runs] == [(a, s) for a in ("none", "told", "told+permuted") for s in (0, 1)]
+    assert finished.mean("told+permuted").value != finished.mean("told").value
     assert finished.seeds("none", "told") == (0, 1)
     assert finished.measured("told", "steps") == [3, 3] == finished.measured("none", "steps")
     found = finished.difference("told", "none", relative=True)
