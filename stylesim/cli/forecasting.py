@@ -67,6 +67,7 @@ def train(
     style_dropout: float = typer.Option(
         0.125, min=0.0, max=0.99, help="Share of samples whose style is hidden in training."
     ),
+    dense: bool = typer.Option(False, help="Learn the futures of the agents around too, and look at them."),
     epochs: int = typer.Option(20, min=1, help="At most this many epochs; stops early without progress."),
     max_steps: int | None = typer.Option(None, min=1, help="At most this many batches, whatever the epochs."),
     patience: int = typer.Option(8, min=1, help="Epochs without a better validation minFDE before it stops."),
@@ -101,6 +102,7 @@ def train(
             size=size,
             reading=reading.value,
             style_dropout=style_dropout,
+            dense=dense,
             spec=WindowSpec(history, future, stride),
             epochs=epochs,
             max_steps=max_steps,

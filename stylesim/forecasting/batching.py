@@ -32,6 +32,7 @@ class Batch:
     piece_attribute: Float32[np.ndarray, "batch piece 14"]
     piece_valid: Bool[np.ndarray, "batch piece"]
     pose: Float32[np.ndarray, "batch 3"]  # of the target in the scene's frame: x, y, heading
+    agent_row: Int64[np.ndarray, "batch agent"]  # of the store
 
     def __len__(self) -> int:
         """Number of samples."""
@@ -80,11 +81,11 @@ def gather(store: SampleStore, index: Int64[np.ndarray, " batch"], config: Input
     """The batch of the given samples."""
     snapshot, target, road = np.asarray(store.sample[index]).T
     pose = np.asarray(store.agent_pose[target])
-    agent, attribute, agent_valid = _agents(store, snapshot, target, pose, config)
+    agent, attribute, agent_valid, agent_row = _agents(store, snapshot, target, pose, config)
     velocity = store.agent_state[target, -1, STATE_VX : STATE_VX + 2]
     ahead = pose[:, :2] + config.ahead_s * velocity
     piece, piece_attribute, piece_valid = _pieces(store, snapshot, road, pose, ahead, config)
-    return Batch(agent, attribute, agent_valid, piece, piece_attribute, piece_valid, pose)
+    return Batch(agent, attribute, agent_valid, piece, piece_attribute, piece_valid, pose, agent_row)
 
 
 def _in_frame(
@@ -111,7 +112,10 @@ def _agents(
     pose: Float32[np.ndarray, "batch 3"],
     config: InputConfig,
 ) -> tuple[
-    Float32[np.ndarray, "batch agent time 7"], Float32[np.ndarray, "batch agent 11"], Bool[np.ndarray, "batch agent"]
+    Float32[np.ndarray, "batch agent time 7"],
+    Float32[np.ndarray, "batch agent 11"],
+    Bool[np.ndarray, "batch agent"],
+    Int64[np.ndarray, "batch agent"],
 ]:
     rows, valid = _nearest(store.agent_pose[:, :2], store.snapshot_agents[snapshot], pose[:, :2], config.agents)
     # Agents on one spot (a simulator's fault) must not push the target from its place.
@@ -124,7 +128,7 @@ def _agents(
     is_target = np.broadcast_to(np.arange(config.agents) == 0, rows.shape)
     attribute = np.concatenate([raw[..., :2], is_target[..., None], kind], axis=-1).astype(np.float32)
     attribute[~valid] = 0.0
-    return agent, attribute, valid
+    return agent, attribute, valid, rows
 
 
 def _pieces(

@@ -54,6 +54,7 @@ class ModelConfig:
     contexts: int = 2
     style_features: int = 0  # length of the style vector, for conditions of numbers instead of cells
     style_parameters: int = 0  # the style is given at least so many, idle ones included: arms of equal size
+    dense: bool = False  # learn the futures of the agents around too
     style_dropout: float = 0.125  # REFERENCE section 4: 10-15 %
 
     def __post_init__(self) -> None:

@@ -17,6 +17,7 @@ from stylesim.forecasting.batching import gather, to_target
 from stylesim.forecasting.conditioner import StyleCond
 from stylesim.forecasting.config import InputConfig
 from stylesim.forecasting.intentions import intentions
+from stylesim.forecasting.neighbours import neighbour_futures, sample_of_agent
 from stylesim.forecasting.snapshot import STATE_VX
 from stylesim.forecasting.store import SampleStore
 from stylesim.forecasting.tensors import TensorBatch
@@ -31,6 +32,7 @@ class Example:
     style: Tensor  # [batch 3] (z, k, c), or [batch number]
     future_m: Float[Tensor, "batch time 2"]  # frame of the target at t0
     group: Int64[Tensor, " batch"] | None = None  # what the sample counts for; never an input
+    neighbour_m: Float[Tensor, "batch agent time 2"] | None = None  # futures around, for dense prediction
 
 
 @dataclass(frozen=True, eq=False)
@@ -46,6 +48,7 @@ class TrainingData:
     sampling: Float64[np.ndarray, " train"] | None = None
     group: Int64[np.ndarray, " sample"] | None = None
     needed: tuple[str, ...] = ("train", "val")
+    dense: bool = False  # give the futures of the agents around too
 
     def __post_init__(self) -> None:
         """Refuse data without training or validation samples."""
@@ -111,7 +114,12 @@ class TrainingData:
             torch.from_numpy(self.style[index]).to(device),
             torch.from_numpy(future).to(device),
             None if self.group is None else torch.from_numpy(self.group[index]).to(device),
+            torch.from_numpy(neighbour_futures(self.store, batch, self._asked)).to(device) if self.dense else None,
         )
+
+    @cached_property
+    def _asked(self) -> Int64[np.ndarray, " agent"]:
+        return sample_of_agent(self.store)
 
     def examples(self, batches: list[Int64[np.ndarray, " batch"]], device: torch.device) -> Iterator[Example]:
         """The batches one after the other."""

@@ -25,6 +25,7 @@ class Modes:
     mean_m: Float[Tensor, "batch path time 2"]
     log_sd: Float[Tensor, "batch path time 2"]
     logit: Float[Tensor, "batch query"]
+    neighbour_m: Float[Tensor, "batch agent time 2"] | None = None  # with dense prediction, of the last layer
 
     def path_of(
         self, query: Int[Tensor, " batch"]

@@ -16,6 +16,7 @@ from stylesim.forecasting.checkpoint import read_tensors, write_tensors
 from stylesim.forecasting.devices import Runtime
 from stylesim.forecasting.mixing import TrainingSet
 from stylesim.forecasting.model import ForecastNetwork
+from stylesim.forecasting.neighbours import neighbour_loss
 from stylesim.forecasting.objective import mixture_loss, responsible_query
 from stylesim.forecasting.style_embedding import style_parameter_groups
 from stylesim.forecasting.validation import validated
@@ -111,6 +112,8 @@ class Loop:
             anchor = self.network.anchors(example.inputs)
             modes = self.forward(example.inputs, example.style, responsible_query(anchor, example.future_m))
             each = mixture_loss(modes, anchor, example.future_m)
+            if modes[-1].neighbour_m is not None and example.neighbour_m is not None:
+                each = each + neighbour_loss(modes[-1].neighbour_m, example.neighbour_m)
             loss = self.weigher(each, example.group)
             value = float(loss.detach())
             if not math.isfinite(value):

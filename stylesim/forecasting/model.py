@@ -6,7 +6,7 @@ cores.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import torch
 from jaxtyping import Float, Int
@@ -17,6 +17,7 @@ from stylesim.forecasting.config import ModelConfig
 from stylesim.forecasting.head import Head, Modes
 from stylesim.forecasting.intentions import SPEED_EDGES_MPS
 from stylesim.forecasting.layers import DecoderLayer, EncoderLayer, PatchEncoder, Perceptron, key_bias, scale
+from stylesim.forecasting.neighbours import NeighbourFutures
 from stylesim.forecasting.selection import selected_queries
 from stylesim.forecasting.style_vector import idle_parameters, style_module
 from stylesim.forecasting.tensors import TensorBatch
@@ -34,6 +35,7 @@ class Encoded:
     piece: Float[Tensor, "batch piece 2*width"]  # keys and values
     bias: Float[Tensor, "batch 1 1 token"]  # which tokens exist, see `key_bias`
     late: Float[Tensor, "batch width"] | None
+    neighbour_m: Float[Tensor, "batch agent time 2"] | None = None
 
 
 class SceneEncoder(nn.Module):
@@ -109,6 +111,7 @@ class ForecastNetwork(nn.Module):
             DecoderLayer(width, config.heads, config.dropout) for _ in range(config.decoder_layers)
         )
         self.heads = nn.ModuleList(Head(config) for _ in range(config.decoder_layers))
+        self.neighbours = NeighbourFutures(config) if config.dense else None
         self.style = style_module(config)  # last, so that the rest starts alike with and without it
         self.register_parameter("idle", idle_parameters(config, self.style))
         self.register_buffer("intention_mps2", torch.zeros(len(SPEED_EDGES_MPS) + 1, config.queries, 2))
@@ -148,6 +151,7 @@ class ForecastNetwork(nn.Module):
             if len(modes) < len(self.heads):
                 with torch.no_grad():
                     end = head.mean(query, anchor[:, :, -1:])[:, :, 0]
+        modes[-1] = replace(modes[-1], neighbour_m=encoded.neighbour_m)
         return modes
 
     def predict(
@@ -181,7 +185,10 @@ class ForecastNetwork(nn.Module):
         agent, piece = self.encoder(batch, bias, embedding if fusion == "early" else None)
         if fusion == "mid" and embedding is not None:
             agent = added_to_target(agent, embedding)
-        return Encoded(agent, piece, bias, embedding if fusion == "late" else None)
+        neighbour = None
+        if self.neighbours is not None:
+            agent, neighbour = self.neighbours(agent, batch)
+        return Encoded(agent, piece, bias, embedding if fusion == "late" else None, neighbour)
 
     def _first_query(
         self, batch: TensorBatch, encoded: Encoded, anchor: Float[Tensor, "batch query time 2"]

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import shutil
 from collections.abc import Callable, Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -42,6 +42,7 @@ def train(
     size: str = "tiny",
     reading: str = "R1",
     style_dropout: float = 0.125,
+    dense: bool = False,
     spec: WindowSpec = WindowSpec(),
     seed: int = 0,
     out: str | Path,
@@ -65,11 +66,12 @@ def train(
     `condition` is one of `conditions.CONDITIONS` ("none", "tdbm", "tdbm_scores", ...): what the history shows of the
     style, added to the network at `fusion` ("early", "mid" or "late"); docs/forecasting.md describes them. Whatever
     the condition, the network has the same number of parameters. `style_dropout` is the share of training samples
-    whose style is hidden, so that the model also works without it. `judges` are fitted labellers to use in place of
-    ones fitted here on the training split. `cache` is where compiled samples are kept. The same seed gives the same
-    weights (same machine, same number of threads); `out` appears under its name only when whole, and `resume`
-    continues OUT.partial with the last finished epoch. `out` holds model.pt and training.json (settings, loss curve).
-    InputError for a corpus without those splits, unknown names, or an `out` that exists.
+    whose style is hidden, so that the model also works without it. `dense` learns the futures of the agents around
+    too. `judges` are fitted labellers to use in place of ones fitted here on the training split. `cache` is where
+    compiled samples are kept. The same seed gives the same weights (same machine, same number of threads); `out`
+    appears under its name only when whole, and `resume` continues OUT.partial with the last finished epoch. `out`
+    holds model.pt and training.json (settings, loss curve). InputError for a corpus without those splits, unknown
+    names, or an `out` that exists.
 
     `robust` says what to do for rare drivers: names as "balanced,jtt", or `RobustSettings`. `augment` is a corpus,
     usually generated, from which the share `augment_share` of every batch is taken at equal gradient steps
@@ -83,12 +85,13 @@ def train(
         seed=seed, epochs=epochs, max_steps=max_steps, batch_size=batch_size, lr=lr, patience=patience
     )
     inputs = InputConfig.of(spec, _time_step(corpus), **VIEWS.get(size, {}))
-    config = model_config(size, inputs, fusion=fusion, reading=reading, style_dropout=style_dropout)
+    config = model_config(size, inputs, fusion=fusion, reading=reading, style_dropout=style_dropout, dense=dense)
     robust = RobustSettings.of(robust)
     added = None if augment is None else added_view(corpus, augment, augment_share)
     out = Path(out)
     record: dict[str, Any] = {"corpus": corpus.fingerprint, "condition": condition, "size": size, "fusion": fusion}
-    record |= {"reading": reading, "style_dropout": style_dropout, "spec": asdict(spec), "settings": asdict(settings)}
+    record |= {"reading": reading, "style_dropout": style_dropout, "dense": dense}
+    record |= {"spec": asdict(spec), "settings": asdict(settings)}
     record |= {"robust": robust.to_dict(), "augment": None if added is None else added.to_dict()}
     if resume and (out / MODEL_FILE).exists():
         check_same(record, out)
@@ -98,6 +101,8 @@ def train(
     conditioner, data, groups = _training_set(
         corpus, added, condition, spec, inputs, judges, robust, seed=seed, cache=cache or cache_dir(), watch=watch
     )
+    if dense:
+        data = data.with_parts([replace(part, dense=True) for part in data.parts])
     config = with_styles(config, conditioner)
     place = runtime(accelerator)
     if "jtt" in robust.methods:

@@ -30,6 +30,7 @@ def world() -> tuple[TensorBatch, torch.Tensor, torch.Tensor]:
         piece_attribute=np.zeros((SAMPLES, 1, 14), np.float32),
         piece_valid=np.zeros((SAMPLES, 1), bool),
         pose=np.zeros((SAMPLES, 3), np.float32),
+        agent_row=np.zeros((SAMPLES, 1), np.int64),
     )
     style = torch.zeros(SAMPLES, 3, dtype=torch.int64)
     style[SAMPLES // 2 :, 0] = 1
