@@ -4,7 +4,8 @@
 
 Both runs load the same files (same drivers, vehicle types, EIDM, `lanechange.duration`) in this process; "off" only
 steps, "on" steps with everything that stylesim does for behaviour while SUMO runs: the wish for speed by the traffic
-around, the decisions at the yellow, the solid line, the lateral wander (computed after the run for every frame).
+around, the decisions at the yellow, the solid line, missed turns, the lateral wander and the drivers' feet (both
+computed after the run for every frame).
 Logging is counted in neither; it has its own benchmark (`benchmarks.generation`). CPU seconds of this process, runs
 interleaved, median and range. Target: <= 1.5.
 """
@@ -22,9 +23,11 @@ import numpy as np
 from stylesim.population import Population
 from stylesim.randomness import stream
 from stylesim.scenario import load_scenario
+from stylesim.simulation.foot import footed
 from stylesim.simulation.sumo.engine import Engine
 from stylesim.simulation.sumo.episode import DT_S, EpisodeFiles, prepare_episode, sumo_options
 from stylesim.simulation.sumo.flow import FlowSense
+from stylesim.simulation.sumo.missing_turns import MissedTurns
 from stylesim.simulation.sumo.stopzone import StopZone
 from stylesim.simulation.sumo.yellow import YellowController
 from stylesim.simulation.wander import lateral_wander
@@ -46,22 +49,29 @@ def styled(engine: Engine, files: EpisodeFiles) -> tuple[float, int]:
     """The same with behaviours."""
     engine.load(sumo_options(files))
     begin, steps = time.process_time(), 0
-    flow, yellow, zone = (
+    behaviours = (
         FlowSense(engine.sumo, files),
         YellowController(engine.sumo, files),
         StopZone(engine.sumo, files),
+        MissedTurns(engine.sumo, files),
     )
     for step in range(round(files.end_s / DT_S)):
-        flow.before_step(step)
-        yellow.before_step(step)
-        zone.before_step(step)
+        for behaviour in behaviours:
+            behaviour.before_step(step)
         engine.step()
         steps += engine.sumo.vehicle.getIDCount()
     people = list(files.drivers.values())
     frames = max(1, round(steps / max(1, len(people))))
+    speed, styles = np.full((len(people), frames), 20.0), [driver.style for driver in people]
+    footed(
+        styles,
+        speed,
+        dt_s=DT_S,
+        streams=[stream(files.seed, files.episode, driver.driver_id, "pedal") for driver in people],
+    )
     lateral_wander(
-        [driver.style for driver in people],
-        np.full((len(people), frames), 20.0),
+        styles,
+        speed,
         limit_m=np.ones(len(people)),
         dt_s=DT_S,
         streams=[stream(files.seed, files.episode, driver.driver_id, "wander") for driver in people],

@@ -17,8 +17,10 @@ from stylesim.signals import SignalState
 from stylesim.simulation.sumo.engine import Engine
 from stylesim.simulation.sumo.episode import DT_S, prepare_episode, sumo_options
 from stylesim.simulation.sumo.flow import FlowSense
-from stylesim.simulation.sumo.live import poses_of, shifted
+from stylesim.simulation.sumo.live import driven, poses_of, shifted
+from stylesim.simulation.sumo.live_foot import Feet
 from stylesim.simulation.sumo.live_wander import Wander
+from stylesim.simulation.sumo.missing_turns import MissedTurns
 from stylesim.simulation.sumo.stopzone import StopZone
 from stylesim.simulation.sumo.yellow import YellowController
 from stylesim.style import STYLE_CLASSES
@@ -51,8 +53,9 @@ class SumoCrowd:
         self.sumo: Any = engine.sumo
         self._yellow = YellowController(engine.sumo, self.files)
         self._zone = StopZone(engine.sumo, self.files)
+        self._missed = MissedTurns(engine.sumo, self.files)
         self._flow = FlowSense(engine.sumo, self.files)
-        self._wander = Wander(self.files)
+        self._wander, self._feet = Wander(self.files), Feet(self.files)
         self._events_seen = 0
         self._step = 0
         self._light = LightWatch(engine.sumo, self.files.network)
@@ -84,6 +87,7 @@ class SumoCrowd:
         self._flow.before_step(self._step)
         self._yellow.before_step(self._step)
         self._zone.before_step(self._step)
+        self._missed.before_step(self._step)
         self._engine.step()
         self._step += 1
         self._poses = None
@@ -113,14 +117,14 @@ class SumoCrowd:
             self.rows = np.fromiter(self._here.values(), np.int64, len(self._here))
 
     def poses(self) -> Float64[np.ndarray, "vehicle 7"]:
-        """Box centres, velocities, headings and sizes of `rows`, with their wander; computed once per step.
+        """Box centres, velocities, headings and sizes of `rows`, with their pedal and wander; computed once per step.
 
         Wander starts with the first call; its first value is stationary, so what came before does not matter.
         """
         if self._poses is None:
             poses = poses_of(self.sumo, list(self._here), self._size[self.rows])
-            speed = np.hypot(poses[:, 2], poses[:, 3])
-            self._poses = shifted(poses, *self._wander.advance(self.rows, speed))
+            ahead, speed = self._feet.advance(self.rows, np.hypot(poses[:, 2], poses[:, 3]))
+            self._poses = shifted(driven(poses, ahead, speed), *self._wander.advance(self.rows, speed))
         return self._poses
 
     def look_again(self) -> None:

@@ -44,6 +44,7 @@ class CrowdLog:
             episode=0,
             warm_up_s=0.0,
             duration_s=0.0,
+            pedal_by_sumo=True,
         )
         self._styled = drivers
         self._everybody: dict[str, Driver] = {}

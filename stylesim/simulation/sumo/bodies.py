@@ -2,13 +2,15 @@
 
 SUMO moves points along lane centre lines and slides them over at a constant lateral speed in a lane change. Here
 
-1. the lateral part of lane changes is smoothed as a driver would steer it (`wander.smoothed_slide`): it lags SUMO by
+1. the driver's foot carries out SUMO's speed with bounded jerk and adds its restlessness (`simulation.foot`): the front
+   is up to some decimetres ahead of SUMO's or behind it, along the body;
+2. the lateral part of lane changes is smoothed as a driver would steer it (`wander.smoothed_slide`): it lags SUMO by
    0.5 s, up to 0.6 m, and reads nothing later;
-2. the driver's wander is added to the path of the front bumper, square to its lane under the body;
-3. the body follows that path: its middle and rear are half a length and a length further back on it; the centre is
+3. the driver's wander is added to the path of the front bumper, square to its lane under the body;
+4. the body follows that path: its middle and rear are half a length and a length further back on it; the centre is
    the mean of the path under the body (five points), which also rounds the corners of SUMO's polylines; the
    heading points from the rear to the front;
-4. the velocity is the step of the centre divided by dt (SUMO's Euler speed is the step that was made, too).
+5. the velocity is the step of the centre divided by dt (SUMO's Euler speed is the step that was made, too).
 """
 
 from __future__ import annotations
@@ -18,6 +20,8 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Int32
 
+from stylesim.simulation.sumo.along import feet
+from stylesim.simulation.sumo.clocks import Clocks
 from stylesim.simulation.sumo.episode import DT_S, Episode
 from stylesim.simulation.sumo.lateral import offsets, slides, without_slide
 from stylesim.simulation.sumo.paths import Points, Rows, Segments, directions, points_behind
@@ -30,7 +34,7 @@ class Bodies:
 
     driver: Int32[np.ndarray, " row"]
     step: Int32[np.ndarray, " row"]
-    front_m: Points  # as SUMO had it
+    front_m: Points  # without the wander
     speed_mps: Rows  # along its lane
     position_m: Points
     velocity_mps: Points
@@ -46,16 +50,19 @@ def bodies_of(log: RawLog, files: Episode) -> Bodies:
     rest = log.first_heading_rad[driver]
     slide = slides(log.lateral_m[order], segments)
     ahead = without_slide(segments.change(front), slide)
-    speed = _speed(ahead, segments)
+    clocks = Clocks.of(driver, step, len(log.driver_ids))
+    further, speed = feet(log, files, clocks, _speed(ahead, segments))
     length = np.array([files.drivers[name].length_m for name in log.driver_ids])[driver]
     course = segments.total(ahead)  # where the front would be had it only followed its lanes
     (tail,) = points_behind(course, directions(course, segments, rest), segments, (length,))
-    offset = offsets(log, files, driver, step, speed, slide)
-    nose = front + offset[:, None] * _left_of(course - tail)
+    axis = _unit(course - tail)
+    front = front + further[:, None] * axis
+    offset = offsets(log, files, clocks, speed, slide)
+    nose = front + offset[:, None] * _left_of(axis)
     places = tuple(share * length for share in (0.25, 0.5, 0.75, 1.0))
     quarter, half, late, rear = points_behind(nose, directions(nose, segments, rest), segments, places)
     centre = ((nose + rear) / 2 + quarter + half + late) / 4
-    axis = nose - rear
+    body = nose - rear
     return Bodies(
         driver=driver,
         step=step,
@@ -63,7 +70,7 @@ def bodies_of(log: RawLog, files: Episode) -> Bodies:
         speed_mps=speed,
         position_m=centre,
         velocity_mps=segments.change(centre) / DT_S,
-        heading_rad=np.arctan2(axis[:, 1], axis[:, 0]),
+        heading_rad=np.arctan2(body[:, 1], body[:, 0]),
         segments=segments,
     )
 
@@ -76,7 +83,11 @@ def _speed(ahead_m: Points, segments: Segments) -> Rows:
     return speed
 
 
-def _left_of(axis_m: Points) -> Points:
+def _unit(axis_m: Points) -> Points:
+    """Unit vectors that way."""
+    return np.asarray(axis_m / np.maximum(np.hypot(axis_m[:, 0], axis_m[:, 1]), 1e-9)[:, None])
+
+
+def _left_of(axis: Points) -> Points:
     """Unit vectors to the left."""
-    length = np.maximum(np.hypot(axis_m[:, 0], axis_m[:, 1]), 1e-9)
-    return np.stack([-axis_m[:, 1] / length, axis_m[:, 0] / length], axis=1)
+    return np.stack([-axis[:, 1], axis[:, 0]], axis=1)

@@ -13,8 +13,11 @@ from stylesim.randomness import stream
 from stylesim.simulation.sumo.options import Flow, SumoOptions
 from stylesim.simulation.sumo.roads import RoadNetwork
 from stylesim.simulation.sumo.signals import ONSET_S
-from stylesim.simulation.sumo.vehicles import Driver, draw_body, type_attributes
+from stylesim.simulation.sumo.vehicles import TRUCK_TOP_SPEED_MPS, Driver, draw_body, type_attributes
+from stylesim.style import DriverStyle
 
+STYLES_OF_SLOW_TRUCKS = ("careful", "cautious")
+MOST_TRUCKS = 0.5  # of the drivers of those styles; chosen, because a population of few of them has cars, too
 SHORTEST_HEADWAY_S = 0.5  # between entries of one flow; chosen, because two lanes at 1 s each can be entered that fast
 ROUTES_HEAD = (
     '<routes xmlns:xsi="http://www.w3.org/2001/XMLSchema-instance"'
@@ -44,6 +47,20 @@ def _departures(flow: Flow, arrivals: Arrivals) -> Iterator[float]:
         time += shortest + float(rng.exponential(mean - shortest))
 
 
+def truck_chance(style: DriverStyle, population: Population, *, share: float, limit_mps: float | None) -> float:
+    """The chance that this driver has a truck, so that `share` of all drivers do.
+
+    On a road that is faster than a truck's limiter only careful and cautious drivers have one, at most one in two of
+    them: whoever is bound to 25 m/s there is slower than the traffic, and drives as one of these whatever it wishes.
+    """
+    if population.within_class == "neutral" or limit_mps is None or limit_mps <= TRUCK_TOP_SPEED_MPS:
+        return share
+    if style.name not in STYLES_OF_SLOW_TRUCKS:
+        return 0.0
+    slow = sum(population.by_class[name] for name in STYLES_OF_SLOW_TRUCKS)
+    return min(MOST_TRUCKS, share / slow)
+
+
 def drawn_driver(flow: Flow, number: int, depart_s: float, population: Population, arrivals: Arrivals) -> Driver:
     """One driver; each of its draws has a stream of its own, so that another driver shifts none."""
     name = f"{flow.name}.{number}"
@@ -51,11 +68,11 @@ def drawn_driver(flow: Flow, number: int, depart_s: float, population: Populatio
     weight = np.array([flow.to[way] for way in ways])
     seed, episode = arrivals.seed, arrivals.episode
     way = ways[int(stream(seed, episode, name, "route").choice(len(ways), p=weight / weight.sum()))]
-    body = stream(seed, episode, name, "body")
-    truck = bool(body.random() < arrivals.parameters["truck_share"]) and flow.trucks
-    kind, length, width = draw_body(truck=truck, rng=body)
     limit = arrivals.parameters.get("speed_limit_mps", arrivals.limits_mps.get(flow.enter))
     style = population.draw(stream(seed, episode, name, "style"), backend="sumo", limit_mps=limit)
+    body = stream(seed, episode, name, "body")
+    chance = truck_chance(style, population, share=arrivals.parameters["truck_share"], limit_mps=limit)
+    kind, length, width = draw_body(truck=bool(body.random() < chance) and flow.trucks, rng=body)
     return Driver(name, style, kind, length, width, depart_s, f"{flow.enter} {way}".strip())
 
 
@@ -87,18 +104,21 @@ def _entry_xml(driver: Driver) -> str:
     return f'departLane="{entry.lane}" departSpeed="{entry.speed_mps:.3f}" departPos="{entry.position_m:.3f}"'
 
 
-def type_xml(driver: Driver) -> str:
+def type_xml(driver: Driver, *, pedal_by_sumo: bool = True) -> str:
     """The driver's vehicle type."""
-    told = type_attributes(driver) | {"jmDriveAfterYellowTime": f"{ONSET_S:.2f}"}
+    told = type_attributes(driver, pedal_by_sumo=pedal_by_sumo) | {"jmDriveAfterYellowTime": f"{ONSET_S:.2f}"}
     attributes = " ".join(f'{key}="{value}"' for key, value in told.items())
     return f'<vType id="{driver.type_id}" {attributes}/>'
 
 
 def routes_xml(drivers: tuple[Driver, ...], others: tuple[Driver, ...] = ()) -> str:
-    """The route file: a vehicle type and a vehicle for each driver, and types for who `others` will become."""
-    lines = [ROUTES_HEAD, *map(type_xml, others)]
+    """The route file: a vehicle type and a vehicle for each driver, and types for who `others` will become.
+
+    Their pedals are left to `simulation.foot`.
+    """
+    lines = [ROUTES_HEAD, *(type_xml(driver, pedal_by_sumo=False) for driver in others)]
     for driver in drivers:
-        lines.append(type_xml(driver))
+        lines.append(type_xml(driver, pedal_by_sumo=False))
         lines.append(
             f'<vehicle id="{driver.driver_id}" type="{driver.driver_id}" depart="{driver.depart_s:.1f}"'
             f' {_entry_xml(driver)}><route edges="{driver.route}"/></vehicle>'

@@ -38,6 +38,9 @@ class VehicleApi(Protocol):
     def getSpeedMode(self, vehID: str) -> int: ...  # noqa: D102, N802
     def setSpeedMode(self, vehID: str, sm: int) -> None: ...  # noqa: D102, N802
     def getLaneID(self, vehID: str) -> str: ...  # noqa: D102, N802
+    def getRoute(self, vehID: str) -> Sequence[str]: ...  # noqa: D102, N802
+    def getRouteIndex(self, vehID: str) -> int: ...  # noqa: D102, N802
+    def setRoute(self, vehID: str, edgeList: Sequence[str]) -> None: ...  # noqa: D102, N802
     def setType(self, vehID: str, typeID: str) -> None: ...  # noqa: D102, N802
     def setSpeedFactor(self, vehID: str, factor: float) -> None: ...  # noqa: D102, N802
     def setParameter(self, objectID: str, key: str, value: str) -> None: ...  # noqa: D102, N802
@@ -78,6 +81,7 @@ class LaneApi(Protocol):
 
     def getLastStepVehicleIDs(self, laneID: str) -> Sequence[str]: ...  # noqa: D102, N802
     def getMaxSpeed(self, laneID: str) -> float: ...  # noqa: D102, N802
+    def getLinks(self, laneID: str) -> Sequence[tuple[Any, ...]]: ...  # noqa: D102, N802
 
 
 @runtime_checkable

@@ -40,6 +40,7 @@ class Episode:
     warm_up_s: float
     duration_s: float
     twin: Twin | None = None
+    pedal_by_sumo: bool = False  # EIDM's error terms carry the pedal noise, so that the log adds none
     now: dict[str, Driver] = field(default_factory=dict)  # the drivers as they are at the moment; `drivers`: at first
 
     @property

@@ -31,7 +31,8 @@ class FlowSense:
         if not any(now[name].style.flow_share > 0.0 for name in names):
             return
         heading = np.pi / 2 - np.radians([vehicle.getAngle(name) for name in names])
-        limit = np.array([self._limit_of(vehicle.getLaneID(name)) for name in names])
+        lanes = [vehicle.getLaneID(name) for name in names]
+        limit = np.array([self._limit_of(lane) for lane in lanes])
         styles = [now[name].style for name in names]
         own = limit * np.array([style.desired_speed_factor for style in styles])
         around = flow_speed(
@@ -46,7 +47,9 @@ class FlowSense:
             name = names[i]
             before = self._wish.get(name, float(own[i]))
             self._wish[name] = self._keep * before + (1.0 - self._keep) * float(wish[i])
-            vehicle.setSpeedFactor(name, self._wish[name] / float(limit[i]))
+            inside = lanes[i].startswith(":")  # a turn is taken as fast as it allows, however fast the traffic was
+            now_mps = min(self._wish[name], float(own[i])) if inside else self._wish[name]
+            vehicle.setSpeedFactor(name, now_mps / float(limit[i]))
 
     def _limit_of(self, lane: str) -> float:
         """Also of lanes that are too short to be in the road."""

@@ -5,10 +5,11 @@ from __future__ import annotations
 import numpy as np
 from jaxtyping import Float64, Int32
 
+from stylesim.simulation.sumo.clocks import Clocks, switch_of
 from stylesim.simulation.sumo.episode import DT_S, Episode
 from stylesim.simulation.sumo.paths import Points, Rows, Segments
 from stylesim.simulation.sumo.recorder import RawLog
-from stylesim.simulation.wander import ROOM_BEYOND_LANE_M, WanderSwitch, lateral_wander, smoothed_slide
+from stylesim.simulation.wander import ROOM_BEYOND_LANE_M, lateral_wander, smoothed_slide
 
 RENAMED_M = 1.0  # the lateral position jumps by a lane's width where SUMO renames the lane; a step moves 0.15 m at most
 
@@ -36,21 +37,10 @@ def without_slide(step_m: Points, slide_m: Rows) -> Points:
     return result
 
 
-def offsets(
-    log: RawLog,
-    files: Episode,
-    driver: Int32[np.ndarray, " row"],
-    step: Int32[np.ndarray, " row"],
-    speed_mps: Rows,
-    slide_m: Rows,
-) -> Rows:
-    """Wander, and what lane changes lag, of every row; a driver's clock starts with its first row."""
+def offsets(log: RawLog, files: Episode, clocks: Clocks, speed_mps: Rows, slide_m: Rows) -> Rows:
+    """Wander, and what lane changes lag, of every row."""
     drivers = [files.drivers[name] for name in log.driver_ids]
-    begin = np.full(len(drivers), np.iinfo(np.int32).max, np.int32)
-    np.minimum.at(begin, driver, step)
-    frame = step - begin[driver]
-    speed = np.zeros((len(drivers), int(frame.max(initial=0)) + 1))
-    speed[driver, frame] = speed_mps
+    speed = clocks.table(speed_mps)
     narrowest = min(lane.width_m for lane in files.network.road.lanes)
     width = np.array([item.width_m for item in drivers])
     wander = lateral_wander(
@@ -59,19 +49,9 @@ def offsets(
         limit_m=np.maximum((narrowest - width) / 2 + ROOM_BEYOND_LANE_M, 0.0),
         dt_s=DT_S,
         streams=[files.stream(item.driver_id, "wander") for item in drivers],
-        switch=_switch(log, files, begin),
+        switch=switch_of(log, files, clocks, "wander"),
     )
-    return wander[driver, frame] + _lane_change_lag(driver, frame, speed, slide_m)
-
-
-def _switch(log: RawLog, files: Episode, begin: Int32[np.ndarray, " driver"]) -> WanderSwitch | None:
-    """The change of the twin's driver on the way, on the clock of its rows."""
-    step, twin = files.switch_step, files.twin
-    if step < 0 or twin is None or twin.driver not in log.driver_ids:
-        return None
-    agent = log.driver_ids.index(twin.driver)
-    stream = files.stream(twin.driver, "wander", step=step) if twin.new_noise else None
-    return WanderSwitch(agent, max(0, step - int(begin[agent])), twin.style, stream)
+    return clocks.rows(wander) + _lane_change_lag(clocks.driver, clocks.frame, speed, slide_m)
 
 
 def _lane_change_lag(

@@ -26,6 +26,21 @@ def poses_of(sumo: Any, names: list[str], size_m: Float64[np.ndarray, "vehicle 2
     return pose
 
 
+def driven(
+    poses: Float64[np.ndarray, "vehicle 7"],
+    ahead_m: Float64[np.ndarray, " vehicle"],
+    speed_mps: Float64[np.ndarray, " vehicle"],
+) -> Float64[np.ndarray, "vehicle 7"]:
+    """The poses moved ahead, with another speed."""
+    cos, sin = np.cos(poses[:, 4]), np.sin(poses[:, 4])
+    moved = poses.copy()
+    moved[:, 0] += ahead_m * cos
+    moved[:, 1] += ahead_m * sin
+    moved[:, 2] = speed_mps * cos
+    moved[:, 3] = speed_mps * sin
+    return moved
+
+
 def shifted(
     poses: Float64[np.ndarray, "vehicle 7"],
     offset_m: Float64[np.ndarray, " vehicle"],

@@ -23,7 +23,7 @@ NETCONVERT_OPTIONS = (
     "--precision=4",  # 0.1 mm: a lane of 0.3 m that is drawn 0.02 m shorter shows as 2 m/s2
     "--junctions.corner-detail=8",
     "--junctions.internal-link-detail=24",  # points of the lane of a turn, because the tracks follow them
-    "--junctions.limit-turn-speed=2",  # lateral m/s2 at the limit; chosen, because bold drivers (1.3 x) reach 3.4
+    "--junctions.limit-turn-speed=1.4",  # mean lateral m/s2 at the limit; chosen, because the boldest then reach 4
 )
 
 

@@ -46,6 +46,7 @@ class RawLog:
     emergency_stops: tuple[tuple[int, str], ...]
     teleports: tuple[tuple[int, str], ...]
     removed: tuple[tuple[int, str], ...]
+    missed_turns: tuple[tuple[int, str], ...] = ()
 
 
 @dataclass

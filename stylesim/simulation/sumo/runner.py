@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import tempfile
+from dataclasses import replace
 from pathlib import Path
 
 from stylesim.population import Population
@@ -13,6 +14,7 @@ from stylesim.simulation.stressors import check_possible, with_events
 from stylesim.simulation.sumo.engine import Engine
 from stylesim.simulation.sumo.episode import DT_S, EpisodeFiles, prepare_episode, sumo_options
 from stylesim.simulation.sumo.flow import FlowSense
+from stylesim.simulation.sumo.missing_turns import MissedTurns
 from stylesim.simulation.sumo.planned import PlannedEgo
 from stylesim.simulation.sumo.recorder import RawLog, Recorder
 from stylesim.simulation.sumo.scenes import scene_of
@@ -61,6 +63,7 @@ class SumoBackend:
         first = max(0, round((files.warm_up_s - LEAD_S) / DT_S))
         recorder = Recorder(engine.sumo, signals=files.signals, first_step=first)
         yellow, zone = YellowController(engine.sumo, files), StopZone(engine.sumo, files)
+        missed = MissedTurns(engine.sumo, files)
         switch, flow = StyleSwitch(engine.sumo, files, yellow), FlowSense(engine.sumo, files)
         if stressing is not None:
             stressing.let_go = yellow.let_go
@@ -69,6 +72,7 @@ class SumoBackend:
             flow.before_step(step)
             yellow.before_step(step)
             zone.before_step(step)
+            missed.before_step(step)
             if stressing is not None:
                 stressing.before_step(step)
             if ego is not None and (replaced := ego.before_step(step, () if stressing is None else stressing.walkers)):
@@ -77,7 +81,7 @@ class SumoBackend:
             recorder.after_step(step)
             if ego is not None:
                 ego.after_step(step)
-        return recorder.finish(), yellow.events
+        return replace(recorder.finish(), missed_turns=tuple(missed.events)), yellow.events
 
     def close(self) -> None:
         """Ends the simulation."""

@@ -74,6 +74,7 @@ def _tracks(
     answered = [event for event in decisions if warm <= event.step < warm + frames]
     counts["stop_impossible"] = sum(event.impossible for event in answered)
     counts["gave_up_at_red"] = sum(event.gave_up for event in answered)
+    counts["missed_turns"] = sum(warm <= step < warm + frames for step, _ in log.missed_turns)
     counts["settling_steps_dropped"] = int((in_time & ~logged).sum())
     return tracks, counts | _overlap_counts(bodies, files, log.driver_ids, logged)
 

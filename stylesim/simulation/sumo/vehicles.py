@@ -17,7 +17,7 @@ NEUTRAL_GAP_S = 4.5  # agents/styles.yaml: the gap acceptance at which SUMO's ow
 EIDM_NOISE_GAIN_MPS2 = 2.6
 EIDM_LARGEST_SIGMA = 0.5  # chosen, because beyond it the noise saturates
 JERK_LIMIT_MPS3 = 10.0  # default 3: its clipping at exactly +-3 would be visible in the jerk of restless drivers
-EMERGENCY_DECELERATION_MPS2 = 9.0  # SUMO's default for passenger cars
+EMERGENCY_DECELERATION_MPS2 = 7.5  # hardest of 821 stops (TRID 801675): up to 8 m/s2 is left to the lag of the brakes
 TRUCK_HEADWAY = 2.37 / 1.92  # REFERENCE section 5: medians of trucks and cars when following, DLR HT
 TRUCK_ACCELERATION = 0.5  # SUMO's defaults: trucks 1.3 m/s2, cars 2.6
 TRUCK_TOP_SPEED_MPS = 25.0  # 90 km/h, the limiter of lorries in Europe
@@ -63,15 +63,17 @@ def draw_body(*, truck: bool, rng: np.random.Generator) -> tuple[AgentKind, floa
     return AgentKind.CAR, round(3.8 + 1.2 * float(share[0]), 2), round(1.65 + 0.3 * float(share[1]), 2)
 
 
-def type_attributes(driver: Driver) -> dict[str, str]:
+def type_attributes(driver: Driver, *, pedal_by_sumo: bool = True) -> dict[str, str]:
     """The attributes of the driver's vehicle type.
 
     EIDM follows (Salles, Kaufmann, Reuss 2020, as built into SUMO): headway, gap, acceleration and braking are
-    the style's; its error terms carry the pedal noise, at no cost per step. The lane change goes at the lateral
-    speed that takes a lane in `lane_change_duration_s`, and never at more than 0.3 of the speed ahead.
+    the style's. With `pedal_by_sumo` its error terms carry the pedal noise, at no cost per step, for SUMO on its own;
+    generated episodes leave it to `simulation.foot`, which knows its spectrum and gives null twins another pedal.
+    The lane change goes at the lateral speed that takes a lane in `lane_change_duration_s`, and never at more than
+    0.3 of the speed ahead.
     """
     style, truck = driver.style, driver.kind == AgentKind.TRUCK
-    noise = min(EIDM_LARGEST_SIGMA, style.pedal_noise_mps2 / EIDM_NOISE_GAIN_MPS2)
+    noise = min(EIDM_LARGEST_SIGMA, style.pedal_noise_mps2 / EIDM_NOISE_GAIN_MPS2) if pedal_by_sumo else 0.0
     acceleration = style.max_acceleration_mps2 * (TRUCK_ACCELERATION if truck else 1.0)
     numbers = {
         "length": driver.length_m,

@@ -11,9 +11,12 @@ from stylesim.envs.sumo_entry import widest_gap
 from stylesim.population import Population
 from stylesim.randomness import stream
 from stylesim.scenario import load_scenario
+from stylesim.simulation.foot import footed
 from stylesim.simulation.sumo.episode import prepare_episode
 from stylesim.simulation.sumo.live import poses_of, shifted
-from stylesim.simulation.sumo.live_wander import BLOCK, Wander
+from stylesim.simulation.sumo.live_draws import BLOCK
+from stylesim.simulation.sumo.live_foot import Feet
+from stylesim.simulation.sumo.live_wander import Wander
 from stylesim.simulation.wander import ROOM_BEYOND_LANE_M, lateral_wander
 
 
@@ -77,3 +80,23 @@ def test_the_widest_gap_is_taken_in_its_middle_at_a_pace_that_can_be_braked() ->
 def test_a_full_lane_has_no_room() -> None:
     full = lane_of([(99.0 - 6.0 * i, 5.0, 0.0) for i in range(17)])
     assert widest_gap(full, "lane").slack_m < 0
+
+
+def test_feet_step_by_step_are_the_feet_of_a_recorded_episode(tmp_path) -> None:
+    files = prepare_episode(
+        load_scenario("yellow_light"), Population.load("tdbm_spectrum"), seed=3, episode=0, folder=tmp_path
+    )
+    drivers = list(files.drivers.values())[:4]
+    frames = BLOCK + 50
+    model = 8.0 + 8.0 * np.sin(np.arange(frames) / 60.0 + np.arange(4)[:, None])
+    ahead, speed = footed(
+        [driver.style for driver in drivers],
+        model,
+        dt_s=0.1,
+        streams=[stream(3, 0, driver.driver_id, "pedal") for driver in drivers],
+    )
+    feet, rows = Feet(files), np.arange(4)
+    got = np.array([feet.advance(rows, model[:, frame]) for frame in range(frames)])
+    assert np.allclose(got[:, 0].T, ahead, atol=1e-12)
+    assert np.allclose(got[:, 1].T, speed, atol=1e-12)
+    assert np.abs(got[:, 0]).max() > 0.05
