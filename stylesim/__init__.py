@@ -35,6 +35,7 @@ _HOME = {
     "WindowSpec": "stylesim.windows",
     "analyze": "stylesim.evaluation.analysis.analyze",
     "balance": "stylesim.merging.balance",
+    "compare": "stylesim.evaluation.comparison",
     "criticality": "stylesim.evaluation.criticality",
     "evaluate": "stylesim.report.evaluate",
     "fidelity": "stylesim.evaluation.fidelity",
@@ -48,6 +49,7 @@ _HOME = {
     "predict": "stylesim.forecasting.predicting",
     "read": "stylesim.datasets.reading",
     "realism": "stylesim.evaluation.realism",
+    "stress": "stylesim.report.stressing",
     "train": "stylesim.forecasting.training",
     "verify": "stylesim.corpus.verify",
 }

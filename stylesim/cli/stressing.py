@@ -43,7 +43,7 @@ def stress(
     from stylesim.evaluation.stress_corpora import fitting_traffic, generate_traffic, own_traffic
     from stylesim.forecasting.opening import open_forecaster
     from stylesim.report.stress_page import finding
-    from stylesim.report.stressing import run_stress
+    from stylesim.report.stressing import stress as run
     from stylesim.windows import WindowSpec
 
     new_folder(out)
@@ -70,7 +70,7 @@ def stress(
             crowd = own_traffic(given if split == "all" else given.split(split))
         else:
             crowd = generate_traffic(folder, seed=seed, quick=quick, workers=workers, resume=True, progress=tell)
-        found = run_stress(models, crowd, spec=spec, seed=seed, out=out, progress=tell)
+        found = run(models, crowd, spec=spec, seed=seed, out=out, progress=tell)
     for one in found:
         say(finding(one))
     say(f"{out / 'report.html'}")

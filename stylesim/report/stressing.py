@@ -1,4 +1,4 @@
-"""`run_stress`: several forecasters through the stress test, and the folder of its report."""
+"""`stylesim.stress`: several forecasters through the stress test, and the folder of its report."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from stylesim.corpus.files import new_folder
 from stylesim.errors import InputError
 from stylesim.evaluation.evaluate import common_spec
 from stylesim.evaluation.latency import latency
-from stylesim.evaluation.stress import stress
+from stylesim.evaluation.stress import stress as one_forecaster
 from stylesim.evaluation.stress_corpora import StressTraffic
 from stylesim.evaluation.stress_results import Stress
 from stylesim.forecast import Forecaster
@@ -18,7 +18,7 @@ from stylesim.report.stress_page import save_stress
 from stylesim.windows import WindowSpec
 
 
-def run_stress(
+def stress(
     forecasters: Sequence[Forecaster],
     traffic: StressTraffic,
     *,
@@ -38,7 +38,8 @@ def run_stress(
     shutil.rmtree(partial, ignore_errors=True)  # of a run that was killed
     try:
         found = [
-            stress(one, traffic, spec=spec, seed=seed, beside=forecasters, progress=progress) for one in forecasters
+            one_forecaster(one, traffic, spec=spec, seed=seed, beside=forecasters, progress=progress)
+            for one in forecasters
         ]
         every = [corpus for corpora in traffic.populations.values() for corpus in corpora]
         judged = common_spec(forecasters, spec or WindowSpec())
