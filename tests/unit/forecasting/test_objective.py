@@ -18,24 +18,36 @@ def logit(probability: list[float]) -> torch.Tensor:
     return torch.tensor([probability]).log()
 
 
-def test_paths_that_end_close_to_a_better_one_are_put_aside() -> None:
+def test_the_first_mode_is_the_best_single_answer_and_what_ends_close_to_it_is_put_aside() -> None:
     ends = [(0.0, 0.0), (1.0, 0.0), (10.0, 0.0), (20.0, 0.0)]
     path, chance = selected_modes(paths(ends), logit([0.4, 0.3, 0.2, 0.1]), count=2, apart_m=2.5)
-    torch.testing.assert_close(path[0, :, -1], torch.tensor([[0.0, 0.0], [10.0, 0.0]]))
-    # the second's mass goes to the first, the fourth's to the third, its nearest
-    torch.testing.assert_close(chance, torch.tensor([[0.7, 0.3]]))
+    # expected error of ending at 1 m: 0.4 + 0.2 x 9 + 0.1 x 19 = 4.1 m, less than at 0 m (4.3 m) or elsewhere;
+    # of the two that are not put aside, 10 m leaves less than 20 m
+    torch.testing.assert_close(path[0, :, -1], torch.tensor([[1.0, 0.0], [10.0, 0.0]]))
+    seen = {near: math.exp(-0.5 * (near / 4.1) ** 2) for near in (0, 1, 9, 10, 19)}
+    first = 0.4 * seen[1] + 0.3 + 0.2 * seen[9] + 0.1 * seen[19]
+    second = 0.4 * seen[10] + 0.3 * seen[9] + 0.2 + 0.1 * seen[10]
+    torch.testing.assert_close(chance, torch.tensor([[first, second]]) / (first + second))
 
 
-def test_where_too_few_are_apart_the_most_probable_put_aside_fill_up() -> None:
+def test_where_too_few_are_apart_the_best_put_aside_fill_up() -> None:
     ends = [(0.0, 0.0), (1.0, 0.0), (2.0, 0.0), (10.0, 0.0)]
-    path, chance = selected_modes(paths(ends), logit([0.4, 0.1, 0.3, 0.2]), count=3, apart_m=2.5)
+    path, chance = selected_modes(paths(ends), logit([0.35, 0.05, 0.4, 0.2]), count=3, apart_m=2.5)
     assert sorted(path[0, :, -1, 0].tolist()) == [0.0, 2.0, 10.0]
     torch.testing.assert_close(chance.sum(), torch.tensor(1.0))
 
 
-def test_equal_paths_keep_their_own_mass_and_none_is_taken_twice() -> None:
+def test_the_middle_of_a_broad_crowd_is_more_probable_than_a_lone_path() -> None:
+    ends = [(float(x), 0.0) for x in range(0, 40, 4)] + [(0.0, 60.0)]
+    path, chance = selected_modes(paths(ends), logit([0.08] * 10 + [0.2]), count=6, apart_m=2.5)
+    assert 8.0 <= path[0, 0, -1, 0] <= 28.0
+    assert (path[0, :, -1, 1] == 60.0).any()
+    assert chance[0, 0] > chance[0, path[0, :, -1, 1] == 60.0]
+
+
+def test_equal_paths_are_equally_probable_and_none_is_taken_twice() -> None:
     path, chance = selected_modes(paths([(5.0, 0.0)] * 4), logit([0.4, 0.3, 0.2, 0.1]), count=3, apart_m=2.5)
-    torch.testing.assert_close(chance, torch.tensor([[0.5, 0.3, 0.2]]), atol=1e-6, rtol=0)
+    torch.testing.assert_close(chance, torch.full((1, 3), 1 / 3))
     assert path.shape == (1, 3, 3, 2)
 
 
