@@ -85,6 +85,9 @@ def train(
     augment: Path | None = typer.Option(None, help="A (generated) corpus to learn from as well."),
     augment_share: float = typer.Option(0.3, min=0.0, max=1.0, help="Share of every batch that --augment gives."),
     seed: int = typer.Option(0, min=0, help="Same seed, same weights (on one kind of machine)."),
+    accelerator: str = typer.Option("auto", help="auto, cpu or gpu."),
+    precision: str = typer.Option("32-true", help="32-true, or bf16-mixed (needs lightning-fabric)."),
+    compiled: bool = typer.Option(False, "--compile", help="Let torch compile the network; pays on a GPU."),
     resume: bool = typer.Option(False, help="Go on from an unfinished training of the same request."),
 ) -> None:
     """Train the forecaster, with or without style."""
@@ -114,6 +117,9 @@ def train(
             augment_share=augment_share,
             seed=seed,
             out=out,
+            accelerator=accelerator,
+            precision=precision,
+            compiled=compiled,
             resume=resume,
             progress=bar,
             stage=lambda what: bar.stage(what, "steps" if what == "training" else "scenes"),

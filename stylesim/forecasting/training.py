@@ -57,6 +57,8 @@ def train(
     augment_share: float = 0.3,
     cache: Path | None = None,
     accelerator: str = "auto",
+    precision: str = "32-true",
+    compiled: bool = False,
     resume: bool = False,
     progress: Progress | None = None,
     stage: Callable[[str], None] | None = None,
@@ -76,6 +78,9 @@ def train(
     `robust` says what to do for rare drivers: names as "balanced,jtt", or `RobustSettings`. `augment` is a corpus,
     usually generated, from which the share `augment_share` of every batch is taken at equal gradient steps
     (`augmenting.added_view` says which of its scenes).
+
+    `accelerator` ("auto", "cpu", "gpu") and `precision` ("32-true", "bf16-mixed") say where and how it runs, `compiled`
+    that torch compiles the network first; they are no part of what `resume` compares.
 
     `stage` is called with what begins (compiling, fitting, judging, training); `progress` then counts for it.
     """
@@ -104,7 +109,7 @@ def train(
     if dense:
         data = data.with_parts([replace(part, dense=True) for part in data.parts])
     config = with_styles(config, conditioner)
-    place = runtime(accelerator)
+    place = runtime(accelerator, precision, compiled=compiled)
     if "jtt" in robust.methods:
         first, told = _network(config, data, seed), watch.begin("identifying what is hard")
         data = identified(data, first, settings, robust, runtime=place, folder=folder / FIRST_FOLDER, progress=told)
