@@ -14,6 +14,7 @@ from stylesim.corpus import Corpus
 from stylesim.errors import InputError
 from stylesim.experiments.arms import PERMUTED_ARM, Arm, Request, check_arms
 from stylesim.experiments.records import Run, read_runs, write_run
+from stylesim.experiments.remembering import JudgeShelf
 from stylesim.experiments.results import Experiment
 from stylesim.forecast import Forecaster
 from stylesim.windows import WindowSpec
@@ -58,13 +59,15 @@ def run_experiment(
     done = read_runs(out)
     for arm in arms:
         _same(arm, [run for run in done.values() if run.arm == arm.name], out)
+    shelf = JudgeShelf()
     # seed by seed, so that what is stopped early has whole pairs
     todo = [(seed, arm) for seed in seeds for arm in arms if (arm.name, seed) not in done]
     total = len(seeds) * len(arms)
     for number, (seed, arm) in enumerate(todo, start=total - len(todo)):
         if progress is not None:
             progress(f"{arm.name}, seed {seed}", number, total)
-        _one(arm, seed, request, arm.corpus or corpus, judged, out, cache)
+        trained_on = arm.corpus or corpus
+        _one(arm, shelf.options(arm, trained_on, spec), seed, request, trained_on, judged, out, cache)
     if progress is not None:
         progress("done", total, total)
     return Experiment.load(out)
@@ -79,7 +82,16 @@ def _same(arm: Arm, runs: Sequence[Run], out: Path) -> None:
             )
 
 
-def _one(arm: Arm, seed: int, request: Request, corpus: Corpus, judged: Corpus, out: Path, cache: Path | None) -> None:
+def _one(
+    arm: Arm,
+    options: Mapping[str, Any],
+    seed: int,
+    request: Request,
+    corpus: Corpus,
+    judged: Corpus,
+    out: Path,
+    cache: Path | None,
+) -> None:
     """Train one arm with one seed, evaluate it, and write what came of it; the arm's own line last."""
     from stylesim.evaluation.permuted import permuted
     from stylesim.forecasting.checkpoint import RECORD_FILE
@@ -89,7 +101,7 @@ def _one(arm: Arm, seed: int, request: Request, corpus: Corpus, judged: Corpus, 
     folder = out / MODELS / f"{arm.name}.{seed}"
     model = train(
         corpus,
-        **arm.options,
+        **options,
         seed=seed,
         out=folder,
         spec=request.spec,

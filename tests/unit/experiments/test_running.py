@@ -5,6 +5,7 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import polars as pl
 import pytest
 import torch
@@ -13,8 +14,11 @@ from stylesim.corpus import Corpus
 from stylesim.errors import InputError
 from stylesim.experiments.arms import Arm
 from stylesim.experiments.records import RUNS_FILE
+from stylesim.experiments.remembering import Remembered
 from stylesim.experiments.results import Experiment
 from stylesim.experiments.running import run_experiment
+from stylesim.forecasting.measured import Measured
+from stylesim.scene import Scene
 
 from .world import SPEC, Told, world
 
@@ -29,7 +33,7 @@ def _one_thread() -> Iterator[None]:
 
 @pytest.fixture(scope="module")
 def corpus(tmp_path_factory: pytest.TempPathFactory) -> Corpus:
-    return world(tmp_path_factory.mktemp("w") / "c", matters=True, train=4, val=2, test=5)
+    return world(tmp_path_factory.mktemp("w") / "c", matters=True, train=8, val=2, test=5)
 
 
 def arms(corpus: Corpus) -> list[Arm]:
@@ -87,6 +91,38 @@ def test_a_run_whose_line_was_cut_short_is_made_again(corpus: Corpus, tmp_path: 
     assert again.mean("none").value == one.mean("none").value  # from the trained model that was there
     file.write_text("".join(f"{line}\n" for line in file.read_text().splitlines() if line.endswith("}")))
     assert [r.key for r in Experiment.load(tmp_path / "out").runs] == [("none", 0), ("none", 1)]
+
+
+def test_judges_say_once_what_the_labellers_say(corpus: Corpus) -> None:
+    scene = next(iter(corpus))
+    history = scene.history(10, 8)
+    agents, others = np.array([0, 2], np.int32), np.array([1], np.int32)
+
+    class Counting:
+        classes = ("a", "b")
+        asked = 0
+
+        def measure(self, history: Scene, agent_index: np.ndarray) -> Measured:
+            self.asked += 1
+            style = np.asarray(agent_index, np.int64)
+            return Measured(style, np.ones((len(style), 4)), np.full(len(style), history.tracks.n_frames))
+
+        def whole_track(self, scene: Scene, agent_index: np.ndarray) -> np.ndarray:
+            self.asked += 1
+            return np.zeros(len(agent_index), np.int64)
+
+        def to_dict(self) -> dict[str, Any]:
+            return {}
+
+    counting = Counting()
+    judges = Remembered(counting)
+    for _ in range(3):
+        assert judges.measure(history, agents).style.tolist() == [0, 2]
+        assert judges.measure(history, others).style.tolist() == [1]
+        assert judges.measure(scene.history(11, 8), agents).highway.tolist() == [8, 8]
+    assert counting.asked == 3
+    assert judges.whole_track(scene, agents).tolist() == judges.whole_track(scene, agents).tolist() == [0, 0]
+    assert counting.asked == 4
 
 
 def test_refusals(finished: Experiment, corpus: Corpus, tmp_path: Path) -> None:
