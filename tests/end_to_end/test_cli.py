@@ -57,3 +57,25 @@ def test_generate_verify_and_list(tmp_path):
     stylesim("generate", "highway", "--episodes", 1, "--out", tmp_path / "sim")
     assert "sound" in stylesim("verify", tmp_path / "sim")
     assert "highway" in stylesim("list", "scenarios")
+
+
+@pytest.mark.slow
+def test_the_placebo_test_runs_and_says_what_it_could_show(tmp_path, monkeypatch):
+    """Three steps teach nothing: the positive control must fail, and with it the test, whatever else it says."""
+    monkeypatch.setenv("STYLESIM_CACHE", str(tmp_path / "cache"))
+    worlds = []
+    for crowd in ("placebo", "tdbm_spectrum"):
+        raw, mixed = tmp_path / f"{crowd}-raw", tmp_path / crowd
+        stylesim("generate", "highway", "--population", crowd, "--episodes", 12, "--seed", 7, "--out", raw)
+        stylesim("merge", raw, "--split", "0.5,0.2,0.3", "--out", mixed)
+        worlds.append(mixed)
+    short = ("--seeds", 2, "--steps", 3, "--size", "mini", "--stride", 12)
+    stylesim("placebo", *worlds, *short, "--out", tmp_path / "test", code=1)
+    found = json.loads((tmp_path / "test" / "placebo.json").read_text())
+    assert not found["passed"]
+    assert [check["arm"] for check in found["checks"]] == ["tdbm", "oracle", "oracle", "oracle+permuted"]
+    assert all(check["change"]["n_seeds"] == 2 for check in found["checks"])
+    control = found["checks"][2]
+    assert control["world"] == "control" and not control["passed"]
+    said = stylesim("placebo", *reversed(worlds), *short, "--out", tmp_path / "other", code=2)
+    assert "is no placebo" in said
