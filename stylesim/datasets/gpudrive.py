@@ -14,7 +14,7 @@ import numpy as np
 
 from stylesim.datasets.accounting import row_counts
 from stylesim.datasets.dense import checked_tracks, origin_of
-from stylesim.datasets.guarding import reading
+from stylesim.datasets.guarding import mapping, mappings, reading
 from stylesim.datasets.json_files import json_document
 from stylesim.datasets.light_states import light_state
 from stylesim.datasets.polyline_map import PolylineLane, PolylineMap, road_of
@@ -90,14 +90,14 @@ def _scene(document: Mapping[str, Any], file: Path) -> Scene:
         file=file,
         flags=_flags(meta, len(objects)),
     )
-    signals, stops = _signals(document.get("tl_states") or {}, n_frames)
+    signals, stops = _signals(mapping(document.get("tl_states") or {}, "tl_states"), n_frames)
     return Scene(
         scene_id=f"gpudrive_{scenario_id}",
         unit_id=f"womd_{scenario_id}",  # the same drive as in the original, also in splits
         source=SOURCE,
         scenario="womd",
         tracks=tracks,
-        road=_road(document.get("roads") or [], stops, origin),
+        road=_road(mappings(document.get("roads") or [], "roads"), stops, origin),
         signals=signals,
         source_scenario_id=scenario_id,
         official_split=split_of(file.name),

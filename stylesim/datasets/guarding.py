@@ -7,9 +7,10 @@ import pickle
 import sqlite3
 import struct
 import zlib
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -66,3 +67,17 @@ def bounded(file: Path, limit: int = MAX_BYTES) -> Path:
     if size > limit:
         raise InputError(f"{file} has {size} bytes, more than the {limit} that a file of its kind can have")
     return file
+
+
+def mapping(value: Any, what: str) -> Mapping[str, Any]:
+    """A value that must be a set of named values; ValueError where it is none."""
+    if not isinstance(value, Mapping):
+        raise ValueError(f"{what}: expected named values, found {type(value).__name__}")
+    return value
+
+
+def mappings(value: Any, what: str) -> list[Mapping[str, Any]]:
+    """A value that must be a list of sets of named values; ValueError where it is none."""
+    if not isinstance(value, list | tuple):
+        raise ValueError(f"{what}: expected a list, found {type(value).__name__}")
+    return [mapping(one, what) for one in value]

@@ -1,13 +1,15 @@
 """Lyft Level 5 prediction: 25 s scenes at 10 Hz, as zarr (version 2) with scenes, frames and agents.
 
 One of its scenes is one scene, never recut; scenes of one vehicle that follow one another within a minute are one
-recording. Faces of traffic lights are logged as on or off, their colours are in the semantic map (a download of its
-own, which is not read), so the lights stay out.
+recording. Faces of traffic lights are logged as on or off, their colours and lanes are in the semantic map (a download
+of its own, see `lyft_map`): the one that is given, or `semantic_map/semantic_map.pb` beside the store or above it.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
+from dataclasses import replace
+from functools import lru_cache
 from pathlib import Path
 from typing import Any
 
@@ -17,7 +19,9 @@ from stylesim.datasets.accounting import row_counts
 from stylesim.datasets.clocks import frames_of
 from stylesim.datasets.dense import checked_tracks, origin_of, size_when_seen
 from stylesim.datasets.differences import causal_velocity
-from stylesim.datasets.guarding import reading
+from stylesim.datasets.guarding import bounded, reading
+from stylesim.datasets.lyft_lights import FACE, lights_of
+from stylesim.datasets.lyft_map import LyftMap, lyft_map
 from stylesim.datasets.lyft_records import AGENT, FRAME, SCENE, labels_of
 from stylesim.datasets.sniffing import listed, matching
 from stylesim.datasets.zarr_files import RecordArray
@@ -32,16 +36,22 @@ EGO_SIZE_M = (4.87, 1.85)  # l5kit.data: EGO_EXTENT_LENGTH, EGO_EXTENT_WIDTH; th
 POSE_STRIDE = 2  # frames; chosen: differences over 0.2 s instead of 0.1 s halve the noise of the ego's velocity
 # Chosen, as for DLR Urban Traffic: scenes that join within a minute are one continuous recording.
 JOINED_WITHIN_S = 60.0
+SCENE_S = 25.0  # the length of its scenes
+MAPS_ABOVE = 3  # scenes/<name>.zarr, semantic_map/semantic_map.pb, meta.json is the layout that is published
 MAX_FRAMES = 100_000  # chosen: a scene has about 250 frames
 
 
-def scenes(path: str | Path) -> Iterator[Scene]:
+def scenes(path: str | Path, *, map: str = "") -> Iterator[Scene]:
     """The scenes of a zarr folder, or of every one in a folder, in the file's order.
 
-    InputError names the array or chunk that is missing or damaged; MissingDependencyError without numcodecs.
+    `map` is a semantic_map.pb, or "none". InputError names the file, array or chunk that is missing or damaged;
+    MissingDependencyError without numcodecs.
     """
     for store in files(path):
+        where = map_of(store, map)
+        site = None if where is None else _site(where, where.stat().st_mtime_ns)
         with reading(store, "zarr folder of Lyft"):
+            faces = None if site is None else RecordArray(store / "traffic_light_faces", FACE)
             arrays = tuple(
                 RecordArray(store / n, d) for n, d in (("scenes", SCENE), ("frames", FRAME), ("agents", AGENT))
             )
@@ -58,6 +68,8 @@ def scenes(path: str | Path) -> Iterator[Scene]:
                     unit, begin = f"lyft_{host}_{start}", start
                 ended = {host: end}
                 scene = _scene(store, number, record, arrays, kinds, unit, (start - begin) / 1e9)
+                if site is not None and faces is not None:
+                    scene = _on_map(scene, record, arrays[1], faces, site, store, first=number == 0)
             yield scene
 
 
@@ -78,6 +90,38 @@ def _stores(path: Path, find: Callable[..., list[Path]]) -> list[Path]:
     found = [path, *find(path, "*.zarr", "*/*.zarr")] if path.is_dir() else []
     needed = ("scenes", "frames", "agents")
     return [store for store in found if all((store / name / ".zarray").is_file() for name in needed)]
+
+
+@lru_cache(maxsize=1)
+def _site(file: Path, changed_ns: int) -> LyftMap:
+    return lyft_map(file)
+
+
+def map_of(store: Path, given: str) -> Path | None:
+    """The given map, or the nearest `semantic_map/semantic_map.pb`; None where there is none, or "none" is given."""
+    if given:
+        return None if given == "none" else bounded(Path(given))
+    found = (folder / "semantic_map" / "semantic_map.pb" for folder in store.resolve().parents[:MAPS_ABOVE])
+    return next((file for file in found if file.is_file()), None)
+
+
+def _on_map(
+    scene: Scene, record: Any, frames: RecordArray, faces: RecordArray, site: LyftMap, store: Path, *, first: bool
+) -> Scene:
+    """The scene with the lanes around it and what their lights show; lanes without line are counted in the first."""
+    rows = frames.rows(*(int(i) for i in record["frame_index_interval"]))
+    clock = frames_of((rows["timestamp"] - rows["timestamp"][0]) / 1e9, DT_S, store)
+    bounds = rows["traffic_light_faces_index_interval"].astype(np.int64)
+    if (bounds[:, 1] < bounds[:, 0]).any() or (bounds[1:, 0] != bounds[:-1, 1]).any():
+        raise InputError(f"{store}: the faces of lights of scene {scene.source_scenario_id} are not in one piece")
+    road = site.city.around(scene.tracks, SCENE_S)
+    signals = None
+    if road is not None:
+        logged = faces.rows(int(bounds[0, 0]), int(bounds[-1, 1]))
+        frame = np.repeat(clock, bounds[:, 1] - bounds[:, 0])
+        signals = lights_of(logged, frame, int(clock[-1]) + 1, site, [lane.lane_id for lane in road.lanes])
+    incomplete = {"map_lanes_incomplete": site.city.incomplete} if first and site.city.incomplete else {}
+    return replace(scene, road=road, signals=signals, counts={**scene.counts, **incomplete})
 
 
 def _scene(

@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 from jaxtyping import Float32, Float64
 
-from stylesim.datasets.guarding import reading
+from stylesim.datasets.guarding import mappings, reading
 from stylesim.datasets.json_files import json_document
 from stylesim.datasets.polylines import map_line, stop_line_at
 from stylesim.geometry import arc_length
@@ -62,7 +62,10 @@ def _lane(
     stops: Sequence[Float32[np.ndarray, "_ 2"]],
 ) -> Lane:
     token = str(record["token"])
-    centre = map_line(np.concatenate([arc_points(path) for path in document["arcline_path_3"][token]]), _ORIGIN)
+    centre = map_line(
+        np.concatenate([arc_points(path) for path in mappings(document["arcline_path_3"][token], "arcline_path_3")]),
+        _ORIGIN,
+    )
     length = float(arc_length(centre)[-1])
     area = map_line(outline[record["polygon_token"]], _ORIGIN) if record.get("polygon_token") in outline else None
     width = 0.0 if area is None else _area(area) / max(length, 1e-3)

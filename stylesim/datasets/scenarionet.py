@@ -15,7 +15,7 @@ from stylesim.collecting import no_collection
 from stylesim.datasets import safe_pickle
 from stylesim.datasets.accounting import row_counts
 from stylesim.datasets.dense import checked_tracks
-from stylesim.datasets.guarding import bounded, reading
+from stylesim.datasets.guarding import bounded, mapping, reading
 from stylesim.datasets.polyline_map import road_of
 from stylesim.datasets.scenarionet_map import map_of, signals_of
 from stylesim.datasets.scenarionet_tracks import DT_S, tracks_of, units_of
@@ -39,7 +39,7 @@ def scenes(path: str | Path) -> Iterator[Scene]:
         with reading(file, "scenario of ScenarioNet"):
             with no_collection():
                 document = safe_pickle.loads(file.read_bytes())
-            scene = _scene(document, file)
+            scene = _scene(mapping(document, "the document"), file)
         yield scene
 
 
@@ -66,13 +66,14 @@ def _files(path: Path, find: Callable[..., list[Path]]) -> list[Path]:
 
 
 def _scene(document: Mapping[str, Any], file: Path) -> Scene:
-    meta = document["metadata"]
+    meta = mapping(document["metadata"], "metadata")
     scenario_id = str(document.get("id") or meta.get("scenario_id") or file.stem)
     dataset = str(meta.get("dataset") or "unknown")
     read = tracks_of(document, file)
     tracks, dropped = checked_tracks(**read.arrays, dt_s=DT_S, file=file)
-    features = map_of(document.get("map_features") or {}, limits=dataset != "nuscenes")
-    signals = signals_of(document.get("dynamic_map_states") or {}, tracks.n_frames, features)
+    features = map_of(mapping(document.get("map_features") or {}, "map_features"), limits=dataset != "nuscenes")
+    lights = mapping(document.get("dynamic_map_states") or {}, "dynamic_map_states")
+    signals = signals_of(lights, tracks.n_frames, features)
     linked = any(lane.successors for lane in features.lanes)
     t0 = meta.get("current_time_index")
     return Scene(

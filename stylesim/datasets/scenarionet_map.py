@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 
+from stylesim.datasets.guarding import mapping
 from stylesim.datasets.light_states import light_state
 from stylesim.datasets.polyline_map import MPH, PolylineLane, PolylineMap, Stretch
 from stylesim.signals import Signals
@@ -25,7 +26,7 @@ def map_of(features: Mapping[str, Any], *, limits: bool = True) -> PolylineMap:
         kind = str(feature["type"])
         if kind in LANES and "polyline" in feature:
             if len(feature["polyline"]):
-                result.lanes.append(_lane(str(key), feature, limits))
+                result.lanes.append(_lane(str(key), mapping(feature, "a lane"), limits))
         elif kind.startswith(BOUNDARIES):
             if len(feature["polyline"]) >= 2:
                 result.lines[str(key)] = feature["polyline"]

@@ -5,10 +5,12 @@ import numpy as np
 import pytest
 
 from stylesim.datasets.lyft import scenes
+from stylesim.datasets.lyft_map import lyft_map
 from stylesim.errors import InputError, MissingDependencyError
+from stylesim.signals import SignalState
 from stylesim.tracks import AgentKind, TrackFlag
 from tests.formats import lyft_files as lyft
-from tests.formats.world import World
+from tests.formats.world import CROSSWALK, ORIGIN, SPEED_LIMIT_MPS, World
 
 
 @pytest.mark.parametrize("packed", [True, False])
@@ -114,3 +116,78 @@ def test_the_real_sample(shared_data):
     ego = scene.tracks.select(scene.tracks.flagged(TrackFlag.EGO))
     assert ego.valid.all()
     assert 5.0 < ego.speed_mps.mean() < 15.0
+
+
+def test_the_map_comes_from_its_frames_on_the_earth_to_the_world(tmp_path):
+    site = lyft_map(lyft.write_map(tmp_path))
+    lanes = {lane.lane_id: lane for lane in site.city.lanes}
+    assert set(lanes) == {"aaaa", "bbbb", "join"}
+    assert site.city.incomplete == 1  # the lane without boundaries; the cycle lane is left out on purpose
+    first, left, joint = lanes["aaaa"], lanes["bbbb"], lanes["join"]
+    for lane, y, ends in ((first, 0.0, (-60, 50)), (left, 3.5, (-60, 50)), (joint, 0.0, (50, 160))):
+        np.testing.assert_allclose(lane.centre_line_m[[0, -1]] - ORIGIN, [(x, y) for x in ends], atol=0.02)
+        np.testing.assert_allclose(lane.left_boundary_m[:, 1] - ORIGIN[1], y + 1.75, atol=0.02)
+        assert lane.width_m == pytest.approx(3.5, abs=0.02)
+    assert (first.successors, first.left_neighbour, left.right_neighbour) == (("join",), "bbbb", "aaaa")
+    assert [lane.in_junction for lane in (first, joint)] == [False, True]
+    assert first.speed_limit_mps == pytest.approx(SPEED_LIMIT_MPS)
+    np.testing.assert_allclose(first.stop_line_m - ORIGIN, [(50, 1.75), (50, -1.75)], atol=0.02)
+    assert joint.stop_line_m is None
+    np.testing.assert_allclose(site.city.crosswalks_m[0], CROSSWALK, atol=0.02)
+    assert dict(site.faces_of_lane) == {"aaaa": ("grnF", "redF", "yelF"), "bbbb": ("grnF", "redF")}
+
+
+def test_faces_have_their_colours_and_lanes_from_the_map(tmp_path):
+    lyft.write_map(tmp_path)
+    lyft.write(tmp_path / "scenes", lyft.logged(lyft.records(n_frames=60), lyft.phase))
+    (scene,) = scenes(tmp_path / "scenes")
+    assert {lane.lane_id for lane in scene.road.lanes} == {"aaaa", "bbbb", "join"}
+    np.testing.assert_allclose(
+        scene.road.lane("aaaa").centre_line_m[-1] + scene.tracks.origin_m - ORIGIN, (50, 0), atol=0.02
+    )
+    assert dict(zip(scene.signals.signal_id, scene.signals.lane_id, strict=True)) == {
+        "grnF+redF+yelF": ("aaaa",), "grnF+redF": ("bbbb",),
+    }  # fmt: skip
+    green, yellow, red, dark = SignalState.GREEN, SignalState.YELLOW, SignalState.RED, SignalState.DARK
+    whole = scene.signals.state[scene.signals.signal_id.index("grnF+redF+yelF")]
+    assert whole.tolist() == [green] * 10 + [yellow] * 10 + [red] * 20 + [dark] * 20
+    assert scene.counts["map_lanes_incomplete"] == 1
+    (without,) = scenes(tmp_path / "scenes", map="none")
+    assert without.road is None
+    assert without.signals is None
+
+
+def test_two_colours_at_once_and_faces_that_are_not_logged_are_unknown(tmp_path):
+    lyft.write_map(tmp_path)
+    arrays = lyft.logged(lyft.records(n_frames=60), lambda t: ("redF", "grnF"))
+    arrays["traffic_light_faces"]["face_id"][3 * 30 :] = "else"
+    lyft.write(tmp_path / "scenes", arrays)
+    (scene,) = scenes(tmp_path / "scenes")
+    assert (scene.signals.state == SignalState.UNKNOWN).all()
+
+
+@pytest.mark.parametrize(
+    ("content", "message"),
+    [
+        (b"", "holds no lane"),
+        (lyft.fragment()[:-1], "damaged or no semantic map"),
+        (b"\x12\xff\xff\xff\xff\x0f", "damaged or no semantic map"),
+        (lyft.fragment().replace(b"aaaa", b"\xff\xff\xff\xff"), "damaged or no semantic map"),
+    ],
+)
+def test_damaged_maps_are_named(tmp_path, content, message):
+    file = lyft.write_map(tmp_path, content)
+    lyft.write(tmp_path / "scenes", lyft.logged(lyft.records(), lyft.phase))
+    with pytest.raises(InputError, match=message) as error:
+        list(scenes(tmp_path / "scenes"))
+    assert str(file) in str(error.value)
+
+
+def test_where_the_map_is_must_be_said(tmp_path):
+    file = lyft.write_map(tmp_path)
+    (tmp_path / "meta.json").write_text('{"world_to_ecef": [[1, 2], [3, 4]]}')
+    with pytest.raises(InputError, match="four by four"):
+        lyft_map(file)
+    (tmp_path / "meta.json").unlink()
+    with pytest.raises(InputError, match=r"no meta\.json beside"):
+        lyft_map(file)
