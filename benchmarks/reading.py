@@ -1,11 +1,13 @@
 """Reading a data set: our reader against the format's own devkit, and memory of a small and a large one.
 
     python -m benchmarks.reading [--data ../shared/data] [--devkit-python av2=/path/to/python ...] [--times 10]
+                                 [--only av2 ...]
 
 Each figure is from a fresh process that reads everything once before the clock starts (imports, compiled code, disk
 cache), then once more with it. Both sides read the same files, tracks and map, the runs are interleaved. CPU seconds
-count every thread. A devkit is measured where a Python that has it is named; an environment of its own is made by
-`python -m venv ENV && ENV/bin/pip install av2==0.3.6`.
+count every thread. trajdata has no way to read but into its own cache on disk: it is held against `read`, which writes
+a corpus, on one recorded Waymo scenario under TIMES names. A devkit is measured where a Python that has it is named; an
+environment of its own is made by `python -m venv ENV && ENV/bin/pip install av2==0.3.6`.
 """
 
 from __future__ import annotations
@@ -38,6 +40,13 @@ OURS = """
     for scene in dataset_format({name!r}).scenes()(root):
         found += int(scene.tracks.valid.sum())
 """
+TO_DISK = """
+    import shutil, tempfile
+    from stylesim.datasets.reading import read
+    with tempfile.TemporaryDirectory() as folder:
+        corpus = read({name!r}, root, out=Path(folder) / "corpus")
+        found = corpus.manifest["n_steps"]
+"""
 # What the devkit offers for the same content: every state of every track, and the vector map as objects.
 AV2 = """
     from av2.datasets.motion_forecasting.scenario_serialization import load_argoverse_scenario_parquet
@@ -56,6 +65,17 @@ COMMONROAD = """
         scenario, _ = CommonRoadFileReader(str(file)).open()
         found += sum(1 + len(o.prediction.trajectory.state_list) for o in scenario.dynamic_obstacles)
 """
+TRAJDATA = """
+    import contextlib, shutil, tempfile
+    from trajdata import UnifiedDataset
+    from trajdata.caching.df_cache import DataFrameCache
+    with tempfile.TemporaryDirectory() as name, contextlib.redirect_stdout(sys.stderr):
+        folder = Path(name)
+        shutil.copytree(root, folder / "raw" / "training")
+        data = UnifiedDataset(desired_data=["waymo_train"], data_dirs=dict(waymo_train=str(folder / "raw")),
+            cache_location=str(folder / "cache"), incl_vector_map=True, num_workers=0, verbose=False)
+        found = sum(len(DataFrameCache(folder / "cache", scene).scene_data_df) for scene in data.scenes())
+"""
 READ = """
 import resource, sys
 from stylesim.datasets.reading import read
@@ -71,12 +91,15 @@ class Case:
     name: str
     folder: str
     devkit: str = ""
+    ours: str = OURS
+    kit: str = ""  # its name in --devkit-python, where that is not the format's
 
 
 # Formats without a devkit that installs beside a current numpy are listed for their speed alone.
 CASES: tuple[Case, ...] = (
     Case("av2", "av2", AV2),
     Case("womd", "womd/tfrecord"),
+    Case("womd", "womd/tfrecord", TRAJDATA, TO_DISK, "trajdata"),
     Case("gpudrive", "womd/json"),
     Case("scenarionet", "scenarionet"),
     Case("nuplan", "nuplan"),
@@ -113,10 +136,25 @@ def repeated(source: Path, target: Path, times: int) -> None:
                 shutil.copyfile(file, made / file.name)
 
 
+def renamed(source: Path, target: Path, times: int) -> None:
+    """One TFRecord file with the scenarios of a file, each under so many ids of the same length."""
+    from stylesim.datasets.tfrecord import framed, records
+    from stylesim.datasets.womd import scenes
+
+    (file,) = source.glob("*tfrecord*")
+    names = [scene.source_scenario_id.encode() for scene in scenes(file)]
+    target.mkdir()
+    with (target / file.name).open("wb") as made:
+        for number in range(times):
+            for name, record in zip(names, records(file), strict=True):
+                own = b"%0*d" % (min(len(name), 6), number) + name[6:]
+                made.write(framed(record.replace(name, own)))
+
+
 def compare(case: Case, path: Path, python: str | None) -> None:
     """Print one row: CPU seconds of ours and of the devkit, and their ratio run by run."""
     size = sum(f.stat().st_size for f in path.rglob("*") if f.is_file()) / 1e6
-    ours_code = CLOCK.format(body=OURS.format(name=case.name).strip())
+    ours_code = CLOCK.format(body=case.ours.format(name=case.name).strip())
     theirs_code = CLOCK.format(body=case.devkit.strip()) if case.devkit else ""
     ours, theirs = [], []
     for _ in range(RUNS):
@@ -124,7 +162,7 @@ def compare(case: Case, path: Path, python: str | None) -> None:
         if python and theirs_code:
             theirs.append(run(python, theirs_code, path))
     cpu = [r[1] for r in ours]
-    print(f"{case.name:12}{size:8.1f} MB  ours {spread(cpu)} CPU s, wall {spread([r[0] for r in ours])} s,")
+    print(f"{case.kit or case.name:12}{size:8.1f} MB  ours {spread(cpu)} CPU s, wall {spread([r[0] for r in ours])} s,")
     print(f"{'':12}{size / statistics.median(cpu):8.1f} MB per CPU second, {ours[0][2]:.0f} agent-frames")
     if theirs:
         if theirs[0][2] != ours[0][2]:
@@ -134,7 +172,7 @@ def compare(case: Case, path: Path, python: str | None) -> None:
         print(f"{'':12}devkit {spread([r[1] for r in theirs])} CPU s, wall {spread([r[0] for r in theirs])} s")
         print(f"{'':12}times as fast: CPU {spread(ratio)}, wall {spread(wall)}, n = {RUNS} (target {TARGET:g})")
     elif case.devkit:
-        print(f"{'':12}devkit not measured: no --devkit-python {case.name}=… given")
+        print(f"{'':12}devkit not measured: no --devkit-python {case.kit or case.name}=… given")
 
 
 def memory(source: Path, folder: Path, times: int) -> None:
@@ -165,11 +203,15 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--data", type=Path, default=Path("../shared/data"))
     parser.add_argument("--devkit-python", action="append", default=[], metavar="FORMAT=PYTHON")
-    parser.add_argument("--times", type=int, default=10, help="how often the av2 scenarios are repeated")
+    parser.add_argument("--times", type=int, default=10, help="how often the scenarios of av2 and Waymo are repeated")
+    parser.add_argument("--only", action="append", default=[], metavar="FORMAT", help="only these; default: all")
     asked = parser.parse_args()
     pythons = dict(item.split("=", 1) for item in asked.devkit_python)
     with tempfile.TemporaryDirectory() as folder:
         for case in CASES:
+            kit = case.kit or case.name
+            if asked.only and kit not in asked.only:
+                continue
             path = asked.data / case.folder
             if not path.is_dir():
                 print(f"{case.name:12}no files at {path}: skipped")
@@ -177,8 +219,11 @@ def main() -> None:
             if case.name == "av2":
                 path = Path(folder) / "av2"
                 repeated(asked.data / case.folder, path, asked.times)
-            compare(case, path, pythons.get(case.name))
-        if (asked.data / "av2").is_dir():
+            if case.kit == "trajdata":
+                path = Path(folder) / "womd"
+                renamed(asked.data / case.folder, path, asked.times)
+            compare(case, path, pythons.get(kit))
+        if (not asked.only or "av2" in asked.only) and (asked.data / "av2").is_dir():
             memory(asked.data / "av2", Path(folder), asked.times)
 
 
