@@ -19,8 +19,8 @@ from stylesim.report.blocks import Block, Section, picture
 from stylesim.report.figures import MOST_CELLS, WIDTH
 from stylesim.report.html import render
 from stylesim.report.sections import DEFINITIONS
-from stylesim.report.stress_decisions import HEADS
-from stylesim.report.tables import Cell, Table, estimate_cell, number, size_text
+from stylesim.report.stress_decisions import HEADS, TITLES
+from stylesim.report.tables import Cell, Table, estimate_cell, grouped, number, size_text
 from stylesim.report.theme import SERIES_COLOUR, drawing, new_figure
 
 PAIRED = "Mean over drivers of the difference on the same windows; ▼ and ▲ mark 95 % intervals that exclude 0."
@@ -111,7 +111,7 @@ def _decided(found: Comparison) -> list[Section]:
     for (kind, by), cells in found.decisions.items():
         if by != ALL and len(cells) < 2:
             continue
-        title = {ALL: "", "taken": "what was done", "commanded": "commanded style"}.get(by, by)
+        title = "" if by == ALL else TITLES.get(by, by)
         rows = tuple(
             (
                 Cell(value.replace(ALL, "all drivers"), size_text(measures[MEASURES[0]]), "head"),
@@ -119,7 +119,8 @@ def _decided(found: Comparison) -> list[Section]:
             )
             for value, measures in cells.items()
         )
-        caption = f"{kind}{f', by {title}' if title else ''}: above 0 the first one is better, but for the Brier score"
+        what = f"{kind[0].upper()}{kind[1:]}" + (f", by {title}" if title else "")
+        caption = f"{what}: above 0 the first one is better, but for the Brier score"
         table = Table(caption, (title, *(f"Δ {HEADS[name]}" for name in MEASURES)), rows)
         blocks.append(Block(table=table, fold=by not in (ALL, "taken")))
     return [Section("decisions", "The decision that mattered", (PAIRED,), tuple(blocks))] if blocks else []
@@ -138,5 +139,10 @@ def _beside(found: Comparison) -> list[Section]:
     heads = ("", "figure", found.ours.forecaster, found.theirs.forecaster, "better")
     text = "These are not paired: each has its own interval, and overlapping intervals prove nothing."
     return [
-        Section("beside", "Beside each other", (text,), (Block(table=Table("Both on the same traffic", heads, rows)),))
+        Section(
+            "beside",
+            "Beside each other",
+            (text,),
+            (Block(table=Table("Both on the same traffic", heads, grouped(rows))),),
+        )
     ]

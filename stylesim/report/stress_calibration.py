@@ -11,7 +11,7 @@ from stylesim.evaluation.strata import title_of
 from stylesim.evaluation.stress_results import Coverage, Stress
 from stylesim.report.blocks import Block, Section, picture
 from stylesim.report.figures import WIDTH
-from stylesim.report.tables import EM, Cell, Table, estimate_cell, number, size_text
+from stylesim.report.tables import EM, Cell, Table, estimate_cell, grouped, number, size_text
 from stylesim.report.theme import SERIES_COLOUR, SERIES_MARKER, drawing, new_figure
 
 RELIABLE = (
@@ -36,7 +36,7 @@ def calibration_section(found: Sequence[Stress]) -> Section:
              estimate_cell(each.error, digits=3))
             for each in one.reliability
         ] or [(Cell(one.forecaster, look="head"), Cell("all"), Cell(EM, "one mode", "refused"))]  # fmt: skip
-    table = Table("Expected calibration error of mode probabilities", ("forecaster", "drivers", "ECE"), tuple(rows))
+    table = Table("Expected calibration error of mode probabilities", ("forecaster", "drivers", "ECE"), grouped(rows))
     blocks.append(Block(table=table))
     blocks += [
         Block(table=_coverage_table(one.forecaster, each), fold=each.by != "commanded")

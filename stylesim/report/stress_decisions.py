@@ -11,7 +11,7 @@ from stylesim.evaluation.slices import ALL
 from stylesim.evaluation.stress_decisions import CUTS, KINDS, MEASURES, DecisionCell
 from stylesim.evaluation.stress_results import Stress
 from stylesim.report.blocks import Block, Section
-from stylesim.report.tables import EM, Cell, Table, estimate_cell, number, size_text
+from stylesim.report.tables import EM, Cell, Table, estimate_cell, grouped, number, size_text
 
 DECIDED = (
     "Asked at the moment of the decision. Held: one of the modes does what the driver did (the rest is the miss of the "
@@ -24,10 +24,11 @@ WHAT = {
     FIRST_OR_SECOND: "Two whose ways come together (a merge, a ring, a crossing, a change of lane), at the first "
     "moment at which either could have been first: at the place before the other, or not.",
 }
+TITLES = {"taken": "what was done", "commanded": "commanded style", "with an event": "event"}
 HEADS = {"covered": "held", "mass": "probability", "top_right": "most probable mode right", "brier": "Brier"}
 CRITICAL = (
     "By what the driver meets in the future that is to be forecast: its least time to collision with the leader, and "
-    "the hardest braking that it needs to avoid one. The limits are those of `stylesim criticality`."
+    "the hardest braking that it needs to avoid one. The limits are those of stylesim criticality."
 )
 
 
@@ -48,8 +49,13 @@ def decisions_section(found: Sequence[Stress]) -> list[Section]:
             values = list(dict.fromkeys(c.value for _, own in cells for c in own))
             if len(values) > 1:
                 pairs = [(name, c) for value in values for name, own in cells for c in own if c.value == value]
-                title = {"taken": "what was done", "commanded": "commanded style"}.get(by, by)
-                blocks.append(Block(table=_decision_table(f"{kind}, by {title}", title, pairs), fold=by != "taken"))
+                title = TITLES.get(by, by)
+                blocks.append(
+                    Block(
+                        table=_decision_table(f"{kind[0].upper()}{kind[1:]}, by {title}", title, pairs),
+                        fold=by != "taken",
+                    )
+                )
     return [Section("decisions", "The decision that mattered", (DECIDED,), tuple(blocks))] if blocks else []
 
 
@@ -64,7 +70,7 @@ def _decision_table(caption: str, title: str, pairs: Sequence[tuple[str, Decisio
         )
         rows.append((*lead, *(estimate_cell(cell.measures[m]) for m in MEASURES), Cell(_guess(cell), look="number")))
     heads = (*((title,) if title else ()), "forecaster", *(HEADS[m] for m in MEASURES), "Brier of guessing")
-    return Table(caption, heads, tuple(rows))
+    return Table(caption, heads, grouped(rows))
 
 
 def _guess(cell: DecisionCell) -> str:
@@ -85,5 +91,5 @@ def criticality_section(found: Sequence[Stress]) -> list[Section]:
                         rows.append((*lead, *(estimate_cell(item.metrics[metric]) for metric in METRICS)))
         heads = (by, "forecaster", *(HEADINGS[metric] for metric in METRICS))
         caption = f"By {by} in the future: mean over drivers, 95 % interval below"
-        blocks.append(Block(table=Table(caption, heads, tuple(rows))))
+        blocks.append(Block(table=Table(caption, heads, grouped(rows))))
     return [Section("criticality", "When it is close", (CRITICAL,), tuple(blocks))] if blocks else []

@@ -19,7 +19,7 @@ from stylesim.report.sections import errors_section, warnings
 from stylesim.report.stress_calibration import calibration_section
 from stylesim.report.stress_decisions import criticality_section, decisions_section
 from stylesim.report.stress_twins import latency_section, twins_section
-from stylesim.report.tables import Cell, Table, estimate_cell, facts_table, number, size_text
+from stylesim.report.tables import Cell, Table, estimate_cell, facts_table, grouped, number, size_text
 from stylesim.report.theme import plural
 
 LATENCY_FILE = "latency.json"
@@ -120,18 +120,21 @@ def _degradation_table(found: Sequence[Stress]) -> Table:
                 *(estimate_cell(change.change[metric], judge=True) for metric in METRICS),
             ))  # fmt: skip
     heads = ("forecaster", "scenario", "minFDE (m)", *(f"Δ {HEADINGS[metric]}" for metric in METRICS))
-    return Table("rare_heavy minus naturalistic, with 95 % intervals", heads, tuple(rows))
+    return Table("rare_heavy minus naturalistic, with 95 % intervals", heads, grouped(rows))
 
 
 def _events_section(found: Sequence[Stress]) -> Section:
+    values = dict.fromkeys(item.value for one in found for item in one.events)
     rows = [
         (
             Cell(item.value, size_text(item.size), "head"), Cell(one.forecaster),
             *(estimate_cell(item.metrics[metric]) for metric in METRICS),
         )
+        for value in values
         for one in found
         for item in one.events
+        if item.value == value
     ]  # fmt: skip
     heads = ("event", "forecaster", *(HEADINGS[metric] for metric in METRICS))
-    table = Table("By event: mean over drivers, 95 % interval below", heads, tuple(rows))
+    table = Table("By event: mean over drivers, 95 % interval below", heads, grouped(rows))
     return Section("events", "When something happens", (EVENTS,), (Block(table=table),))

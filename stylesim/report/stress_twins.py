@@ -10,7 +10,7 @@ from stylesim.evaluation.stress_twins import MIXTURE
 from stylesim.evaluation.twin_pairs import NULL, TWIN
 from stylesim.evaluation.twin_shift import FIGURES
 from stylesim.report.blocks import Block, Section
-from stylesim.report.tables import Cell, Table, estimate_cell, number, size_text
+from stylesim.report.tables import Cell, Table, estimate_cell, grouped, number, size_text
 
 SWITCHED = (
     "One past, two futures: at t0 the driver becomes another person. The histories are the same to the last bit, "
@@ -61,7 +61,7 @@ def _switched(found: Sequence[Stress]) -> Table:
 def _mixture(found: Sequence[Stress]) -> Table:
     rows = tuple(
         (
-            Cell(one.forecaster, size_text(figures["score_m"]), "head"), Cell(PAIRS[pair]),
+            Cell(one.forecaster, look="head"), Cell(PAIRS[pair], size_text(figures["score_m"])),
             *(estimate_cell(figures[name], judge=name == "over_equal_m") for name in MIXTURE),
         )
         for one in found
@@ -69,13 +69,13 @@ def _mixture(found: Sequence[Stress]) -> Table:
         for pair, figures in one.twins.mixture.items()
     )  # fmt: skip
     heads = ("forecaster", "the other future", "energy score (m)", "above equal ones (m)", "above the best (m)")
-    return Table("Probabilities of the modes against the mixture of two futures", heads, rows)
+    return Table("Probabilities of the modes against the mixture of two futures", heads, grouped(rows))
 
 
 def _shift(found: Sequence[Stress]) -> Table:
     rows = tuple(
         (
-            Cell(one.forecaster, size_text(figures["true_m"]), "head"), Cell(PAIRS[pair]),
+            Cell(one.forecaster, look="head"), Cell(PAIRS[pair], size_text(figures["true_m"])),
             *(estimate_cell(figures[name]) for name in FIGURES),
         )
         for one in found
@@ -86,7 +86,7 @@ def _shift(found: Sequence[Stress]) -> Table:
         "forecaster", "the other world", "worlds part (m)", "forecasts part (m)", "the same way",
         "share of it", "beyond constant velocity",
     )  # fmt: skip
-    return Table("Drivers who are another person from the start", heads, rows)
+    return Table("Drivers who are another person from the start", heads, grouped(rows))
 
 
 def latency_section(latencies: Mapping[str, Latency]) -> list[Section]:

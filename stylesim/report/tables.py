@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from itertools import groupby
 
 from stylesim.evaluation.compare import differences
 from stylesim.evaluation.intervals import Estimate
@@ -36,6 +37,16 @@ class Table:
     caption: str
     headings: tuple[str, ...]
     rows: tuple[tuple[Cell, ...], ...]
+
+
+def grouped(rows: Sequence[tuple[Cell, ...]]) -> tuple[tuple[Cell, ...], ...]:
+    """Rows below one another that begin with the same cell: it is written once and spans them."""
+    found: list[tuple[Cell, ...]] = []
+    for lead, group in groupby(rows, key=lambda row: row[0]):
+        members = list(group)
+        found.append((replace(lead, rows=len(members)), *members[0][1:]))
+        found += [row[1:] for row in members[1:]]
+    return tuple(found)
 
 
 def number(value: float, digits: int) -> str:

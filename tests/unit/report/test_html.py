@@ -104,3 +104,12 @@ def test_training_data_in_the_test_is_a_warning(world, tmp_path):
     page = build_report(tmp_path / "r.html", evaluations=[one]).read_text()
     assert "evaluated on scenes of the split(s) train" in page
     assert "too few" in page  # 15 drivers: nothing is claimed anywhere
+
+
+def test_rows_that_begin_alike_share_their_first_cell():
+    from stylesim.report.tables import Cell, grouped
+
+    rows = [(Cell("a"), Cell("1")), (Cell("a"), Cell("2")), (Cell("b"), Cell("3")), (Cell("a"), Cell("4"))]
+    assert grouped(rows) == (
+        (Cell("a", rows=2), Cell("1")), (Cell("2"),), (Cell("b"), Cell("3")), (Cell("a"), Cell("4")),
+    )  # fmt: skip
