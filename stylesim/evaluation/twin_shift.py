@@ -78,7 +78,7 @@ def _compared(
     for t0 in anchor_frames(pair.own, spec):
         sides = []
         for scene in (pair.own, other):
-            asked = twin_question(scene, pair.own, pair.driver, t0, spec, answering)
+            asked = twin_question(scene, scene, pair.driver, t0, spec, answering)  # other pasts: under their own ids
             if asked is None:
                 break
             answer, agent = twin_answer(forecaster, asked), int(asked.task.agent_index[0])
