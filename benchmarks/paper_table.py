@@ -40,7 +40,7 @@ PAPER = {  # REFERENCE section 4 [paper]; it has no mid fusion
 
 def arms(method: str) -> dict[str, Arm]:
     """By what the table calls them."""
-    early = Arm(method, {"condition": method}, permuted=True)
+    early = Arm(method, {"condition": method})
     others = {name: Arm(f"{method}-{name}", {"condition": method, "fusion": name}) for name in ("mid", "late")}
     return {"none": Arm("none"), "early": early, **others}
 

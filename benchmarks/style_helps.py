@@ -25,9 +25,8 @@ ARMS = ("none", "tdbm", "features", "random", "earlier", "earlier_features")
 
 
 def arms() -> list[Arm]:
-    """One for each condition; the told ones also with permuted labels."""
-    plain = [Arm("none")]
-    return plain + [Arm(name, {"condition": name}, permuted=name in TOLD) for name in ARMS[1:]]
+    """One for each condition."""
+    return [Arm("none")] + [Arm(name, {"condition": name}) for name in ARMS[1:]]
 
 
 def show(runs: Experiment) -> None:

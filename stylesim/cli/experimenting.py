@@ -59,8 +59,8 @@ def placebo(
             progress=follow,
         )
     show_table(
-        "Relative change of minFDE against the model that is told nothing; below 0 is a gain",
-        ("world", "told", "expected", "change", "drivers / units / seeds", "shown"),
+        "Relative change of minFDE; below 0 is a gain",
+        ("world", "told", "against", "expected", "change", "drivers / units / seeds", "shown"),
         [_row(check) for check in found.checks],
     )
     write_whole(out / "placebo.json", json_bytes(found.to_dict()))
@@ -78,7 +78,15 @@ def _row(check: Check) -> tuple[str, ...]:
     }[check.expects]
     text = "too few" if change.refused else f"{change.value:+.1%} [{change.low:+.1%}, {change.high:+.1%}]"
     size = f"{change.n_drivers} / {change.n_units} / {change.n_seeds}"
-    return check.world, check.arm, expected, f"{text} ({change.level:.0%})", size, "yes" if check.passed else "no"
+    return (
+        check.world,
+        check.arm,
+        check.against,
+        expected,
+        f"{text} ({change.level:.0%})",
+        size,
+        "yes" if check.passed else "no",
+    )
 
 
 def add_to(app: typer.Typer) -> None:

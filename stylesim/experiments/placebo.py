@@ -17,12 +17,13 @@ from stylesim.windows import WindowSpec
 
 MARGIN = 0.015  # of the relative gain, to be held by its 90 % interval: the project's own requirement
 NONE, ORACLE = "none", "oracle"
+PERMUTED_ORACLE = f"{ORACLE}{PERMUTED_ARM}"
 PLACEBO_WORLD, CONTROL_WORLD = "placebo", "control"
 
 
 @dataclass(frozen=True)
 class Check:
-    """One line of the test: the relative change of minFDE of an arm against the one that is told nothing.
+    """One line of the test: the relative change of minFDE of an arm against another.
 
     `expects` is "nothing" (the 90 % interval lies within ± the margin), "gain" (the 95 % interval lies below 0) or
     "no gain" (the 90 % interval lies above - the margin: worse is allowed).
@@ -30,6 +31,7 @@ class Check:
 
     world: str
     arm: str
+    against: str
     expects: str
     change: SeededEstimate
     margin: float
@@ -47,7 +49,13 @@ class Check:
 
     def to_dict(self) -> dict[str, Any]:
         """Plain JSON values."""
-        facts = {"world": self.world, "arm": self.arm, "expects": self.expects, "margin": self.margin}
+        facts = {
+            "world": self.world,
+            "arm": self.arm,
+            "against": self.against,
+            "expects": self.expects,
+            "margin": self.margin,
+        }
         return {**facts, "passed": self.passed, "change": self.change.to_dict()}
 
 
@@ -86,8 +94,9 @@ def placebo(
 
     `world` was generated with the population "placebo" (commanded classes in name only), `control` with another; both
     need splits. In `world`, neither `condition` nor the commanded style (the oracle) may change the test minFDE; in
-    `control`, the oracle must gain, and with its labels permuted within scenario and context must not. The folder `out`
-    holds the runs; the same call again goes on. InputError where `world` is no placebo or `control` is one.
+    `control`, the oracle must gain over the model that is told nothing and over itself with its labels permuted within
+    scenario and context, and with these it must not gain. The folder `out` holds the runs; the same call again goes on.
+    InputError where `world` is no placebo or `control` is one.
     """
     check_worlds(world, control)
     told = {"condition": condition, "fusion": fusion}
@@ -108,16 +117,17 @@ def placebo_of(out: Path, *, condition: str = "tdbm", margin: float = MARGIN) ->
     """What the runs in a folder of `placebo` say so far; InputError where arms are missing."""
     worlds = {name: Experiment.load(out / name) for name in (PLACEBO_WORLD, CONTROL_WORLD)}
     wanted = (
-        (PLACEBO_WORLD, condition, "nothing"),
-        (PLACEBO_WORLD, ORACLE, "nothing"),
-        (CONTROL_WORLD, ORACLE, "gain"),
-        (CONTROL_WORLD, f"{ORACLE}{PERMUTED_ARM}", "no gain"),
+        (PLACEBO_WORLD, condition, NONE, "nothing"),
+        (PLACEBO_WORLD, ORACLE, NONE, "nothing"),
+        (CONTROL_WORLD, ORACLE, NONE, "gain"),
+        (CONTROL_WORLD, ORACLE, PERMUTED_ORACLE, "gain"),
+        (CONTROL_WORLD, PERMUTED_ORACLE, NONE, "no gain"),
     )
     checks = []
-    for name, arm, expects in wanted:
+    for name, arm, against, expects in wanted:
         level = 0.95 if expects == "gain" else EQUIVALENCE_LEVEL
-        change = worlds[name].difference(arm, NONE, metric=METRIC, relative=True, level=level)
-        checks.append(Check(name, arm, expects, change, margin))
+        change = worlds[name].difference(arm, against, metric=METRIC, relative=True, level=level)
+        checks.append(Check(name, arm, against, expects, change, margin))
     return Placebo(tuple(checks))
 
 

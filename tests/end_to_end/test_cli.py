@@ -73,7 +73,7 @@ def test_the_placebo_test_runs_and_says_what_it_could_show(tmp_path, monkeypatch
     stylesim("placebo", *worlds, *short, "--out", tmp_path / "test", code=1)
     found = json.loads((tmp_path / "test" / "placebo.json").read_text())
     assert not found["passed"]
-    assert [check["arm"] for check in found["checks"]] == ["tdbm", "oracle", "oracle", "oracle+permuted"]
+    assert [check["arm"] for check in found["checks"]] == ["tdbm", "oracle", "oracle", "oracle", "oracle+permuted"]
     assert all(check["change"]["n_seeds"] == 2 for check in found["checks"])
     control = found["checks"][2]
     assert control["world"] == "control" and not control["passed"]

@@ -35,19 +35,19 @@ def change(low: float, high: float, *, level: float = 0.9, status: str = "genera
     ],
 )
 def test_what_passes(expects: str, low: float, high: float, passed: bool) -> None:
-    check = Check("w", "a", expects, change(low, high), 0.015)
+    check = Check("w", "a", "none", expects, change(low, high), 0.015)
     assert check.passed is passed
     assert Placebo((check,)).passed is passed and Placebo((check,)).to_dict()["passed"] is passed
 
 
 def test_without_its_positive_control_nothing_is_shown() -> None:
-    nothing = Check("placebo", "tdbm", "nothing", change(-0.01, 0.01), 0.015)
-    missed = Check("control", "oracle", "gain", change(-0.01, 0.01), 0.015)
+    nothing = Check("placebo", "tdbm", "none", "nothing", change(-0.01, 0.01), 0.015)
+    missed = Check("control", "oracle", "none", "gain", change(-0.01, 0.01), 0.015)
     assert nothing.passed and not Placebo((nothing, missed)).passed
 
 
 def test_too_few_drivers_show_nothing() -> None:
-    assert not Check("w", "a", "nothing", change(np.nan, np.nan, status="too few"), 0.015).passed
+    assert not Check("w", "a", "none", "nothing", change(np.nan, np.nan, status="too few"), 0.015).passed
 
 
 def test_a_placebo_population_has_every_style_in_name_and_one_behaviour() -> None:
