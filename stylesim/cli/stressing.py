@@ -40,7 +40,9 @@ def stress(
     """Stress-test forecasters: edge cases in every style; who is forecast worst, and do they know? JSON and HTML."""
     from stylesim.corpus import Corpus
     from stylesim.corpus.files import new_folder
+    from stylesim.evaluation.evaluate import common_spec
     from stylesim.evaluation.stress_corpora import fitting_traffic, generate_traffic, own_traffic
+    from stylesim.forecast import horizon_s
     from stylesim.forecasting.opening import open_forecaster
     from stylesim.report.stress_page import finding
     from stylesim.report.stressing import stress as run
@@ -71,6 +73,10 @@ def stress(
         else:
             crowd = generate_traffic(folder, seed=seed, quick=quick, workers=workers, resume=True, progress=tell)
         found = run(models, crowd, spec=spec, seed=seed, out=out, progress=tell)
+    judged = common_spec(models, spec).future_s
+    if judged < spec.future_s:
+        shortest = min(models, key=horizon_s).name
+        say(f"judged up to {judged:g} s, the horizon of {shortest}; {spec.future_s:g} s were asked for")
     for one in found:
         say(finding(one))
     say(f"{out / 'report.html'}")

@@ -29,8 +29,9 @@ def test_the_whole_examination(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) 
     monkeypatch.chdir(tmp_path)
     Path("their_adapter.py").write_text(ADAPTER)
     names = ["kinematic_fan", "constant_velocity", "lane_following", "their_adapter:factory"]
-    said = stylesim("stress", *names, "--quick", "--stride", 9, "--workers", 2, "--out", "stress")
+    said = stylesim("stress", *names, "--quick", "--stride", 30, "--workers", 2, "--out", "stress")
     assert "kinematic_fan: minFDE" in said
+    assert "judged up to 5 s, the horizon of feet; 6 s were asked for" in said
     traffic = {path.name for path in Path("stress.traffic").iterdir()}
     for scenario in ("yellow_light", "ramp_merge", "roundabout"):
         kinds = ("naturalistic", "rare_heavy", "twins", "twins_from_start", "fitting")
@@ -61,7 +62,7 @@ def test_the_whole_examination(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) 
     assert "kinematic_fan minus feet" in said
     assert "kinematic_fan against feet" in Path("both.html").read_text()
 
-    again = stylesim("stress", *names, "--quick", "--stride", 9, "--traffic", "stress.traffic", "--out", "again")
+    again = stylesim("stress", *names, "--quick", "--stride", 30, "--traffic", "stress.traffic", "--out", "again")
     assert "kinematic_fan: minFDE" in again
     for name in ("kinematic_fan.stress.json", "feet.parquet", "lane_following.decisions.parquet"):
         assert Path("again", name).read_bytes() == Path("stress", name).read_bytes(), name
