@@ -46,7 +46,8 @@ class HighwayWorld:
         options = options_of(scenario)
         drawn = scenario.draw(stream(seed, 0, "", "parameters"))
         crew = Crew(population, seed=seed, episode=0)
-        time_s = SETTLE_S + self._config.duration_s + self._config.period_s
+        # a log lets nobody in at its end, who would be seen too short: here cars come to the end of the episode
+        time_s = SETTLE_S + self._config.duration_s + self._config.period_s + PATIENCE_S
         self._egos, self._last = [], {}
         self._traffic = traffic_of(options, drawn, crew, time_s=time_s)
         self._lights = SeenLights(self._traffic.lights)

@@ -17,11 +17,13 @@ from highway_env.road.lane import CircularLane, StraightLane
 from highway_env.road.road import RoadNetwork
 
 from stylesim.simulation.highway.graph import LaneGraph
-from stylesim.simulation.highway.right_of_way import CREEP_MPS, RightOfWay
+from stylesim.simulation.highway.right_of_way import CREEP_MPS, OVER_LINE_M, RightOfWay
 from stylesim.simulation.highway.sites import LANE_M, SOLID, Edge, Site, Trip
 
 RING_M, ARC_M, ARM_M = 20.0, 15.0, 150.0  # chosen: compact roundabouts have outer diameters of 26 to 40 m (FGSV)
 ARMS = ("s", "e", "n", "w")  # in the order in which the ring passes them
+FROM_REST_MPS, IN_ARC_MPS = 4.0, 6.5  # on average over the arc onto the ring: who starts there, who comes moving
+SPARE_S = 1.0  # chosen: who enters is on the ring that long before who comes
 TURNS = {1: 0.3, 2: 0.5, 3: 0.2}  # arms further on; chosen, because half of the traffic goes straight on
 
 
@@ -92,7 +94,10 @@ def _trip(start: int, turn: int) -> Trip:
 
 
 class RingRule(RightOfWay):
-    """Who enters waits for a gap on the ring as long as its style wants; who will leave before is no obstacle."""
+    """Who enters waits for a gap on the ring as long as its style wants, and as it takes to get there.
+
+    Who will leave before is no obstacle.
+    """
 
     def __init__(self, graph: LaneGraph) -> None:
         self._length_m = graph.length_m
@@ -102,17 +107,20 @@ class RingRule(RightOfWay):
         cars = list(vehicles)
         circling = [car for car in cars if self._on_ring(car.target_lane_index[:2])]
         for car in cars:
-            car.waits_for_gap = False
+            waited, car.waits_for_gap = car.waits_for_gap, False
             start, end, _ = car.target_lane_index
             if car.style is None or not (start.startswith("o") and end.endswith("0")):
                 continue
             distance = self._length_m[car.target_lane_index] - car.road.place(car, car.target_lane_index)[0]
-            if self._looks(car, car.style, distance - car.LENGTH / 2):
+            distance -= car.LENGTH / 2
+            waits_on = waited and distance >= -OVER_LINE_M  # who comes to rest at the line has not gone yet
+            if waits_on or self._looks(car, car.style, distance):
                 entry = f"{end[:-1]}e"
+                on_arc = distance + self._length_m[end, entry, 0]
+                pace = min(max(car.speed, FROM_REST_MPS), IN_ARC_MPS)
+                needed_s = max(car.style.gap_acceptance_s, on_arc / pace + SPARE_S)
                 car.waits_for_gap = any(
-                    self._seconds_to(other, entry) < car.style.gap_acceptance_s
-                    for other in circling
-                    if other is not car
+                    self._seconds_to(other, entry) < needed_s for other in circling if other is not car
                 )
 
     @staticmethod

@@ -15,7 +15,7 @@ LANE_ANGLE_RAD = 0.35  # chosen: largest angle to the lane; highway-env's 45 deg
 WHEEL_RAD = 0.7  # chosen: lock of the front wheels; with highway-env's geometry a turning radius of 6.4 m
 WHEEL_RAD_PS = 2.0  # chosen: how fast a driver turns them; without a limit the lateral velocity jumps
 LATERAL_MPS2 = 3.8  # chosen, because 4 m/s2 is what people accept at most, and discretisation adds a little
-BEND_MARGIN = 1.3  # chosen: over what the bend itself takes, so that the car can come back to the centre
+BEND_MARGIN = 1.1  # chosen: over what the bend itself takes, so that the car can come back to the centre
 SLOW_MPS = 0.01  # as highway-env's not_zero
 
 

@@ -56,7 +56,7 @@ def cars(style: str, *, leaves_before: bool) -> tuple[RingRule, StyledVehicle, l
     """One car at the southern entry, another on the ring west of it."""
     site = roundabout_site(DRAWN)
     on = StyledRoad(network=site.network, np_random=np.random.default_rng(0))
-    enters = StyledVehicle.make_on_lane(on, ("os", "is0", 0), 138.0, 5.0)
+    enters = StyledVehicle.make_on_lane(on, ("os", "is0", 0), 144.0, 5.0)
     enters.route = [(*edge, None) for edge in site.trips[1].edges]
     circles = StyledVehicle.make_on_lane(on, ("iwe", "isx", 0), 1.0, 6.0)
     legs = (
@@ -81,6 +81,15 @@ def test_who_enters_waits_for_who_comes_round_as_long_as_its_style_wants(style, 
     assert enters.waits_for_gap is waits
 
 
+def test_who_has_waited_goes_on_waiting_until_it_stands():
+    rule, enters, everybody = cars("timid", leaves_before=False)
+    rule.assign(everybody)
+    enters.stand_at(("os", "is0", 0), enters.lane.length - enters.LENGTH / 2 - 0.1)
+    enters.speed = 1.5
+    rule.assign(everybody)
+    assert enters.waits_for_gap
+
+
 def test_an_episode_runs_without_collision_and_people_reach_the_other_arms():
     scenario = load_scenario("hw_roundabout").model_copy(update={"warm_up_s": 2.0, "duration_s": 40.0})
     scene = HighwayBackend().run_episode(scenario, Population.load("tdbm_spectrum"), seed=2, episode=0)
@@ -88,3 +97,6 @@ def test_an_episode_runs_without_collision_and_people_reach_the_other_arms():
     from_middle = np.linalg.norm(scene.tracks.position_m, axis=-1)
     assert (np.nanmin(from_middle, axis=1) < RING_M + 2).sum() >= 4
     assert np.nanmin(from_middle) > RING_M - 2.5
+    along, across = scene.tracks.heading_rad[:, 1:], np.diff(scene.tracks.velocity_mps, axis=1) / scene.tracks.dt_s
+    lateral = np.abs(across[..., 1] * np.cos(along) - across[..., 0] * np.sin(along))
+    assert np.nanmax(lateral) < 5.0, "who enters has slowed down for the bend"
