@@ -11,6 +11,7 @@ from stylesim.report import style_figures
 from stylesim.report.blocks import Block, Section, picture
 from stylesim.report.picture import scene_figure
 from stylesim.report.tables import label_table
+from stylesim.report.theme import plural
 
 
 def labels_section(corpora: Sequence[Corpus], methods: Sequence[str]) -> Section | None:
@@ -47,7 +48,8 @@ def yellow_section(corpora: Sequence[Corpus]) -> Section | None:
         if decisions is not None:
             counts = ", ".join(f"{name}: {count}" for name, count in decisions.counts.items())
             caption = (
-                f"{corpus.path.name}: {len(decisions)} decisions of {len(set(decisions.unit))} episodes ({counts})."
+                f"{corpus.path.name}: {plural(len(decisions), 'decision')} of "
+                f"{plural(len(set(decisions.unit)), 'episode')} ({counts})."
             )
             blocks += picture(style_figures.stop_probability_figure(decisions), caption)
     return Section("yellow", "The decision at the yellow", (), tuple(blocks)) if blocks else None

@@ -15,6 +15,7 @@ from stylesim.report import data_sections as data
 from stylesim.report import sections as parts
 from stylesim.report.blocks import Section
 from stylesim.report.figures import Curve
+from stylesim.report.theme import plural
 
 METHODS = ("tdbm", "kdsc")
 
@@ -76,4 +77,4 @@ def _lead(evaluations: Sequence[Evaluation], corpora: Sequence[Corpus]) -> str:
         dict.fromkeys([*(one.about["corpus"]["name"] for one in evaluations), *(c.path.name for c in corpora)])
     )
     versions = next((f", made with stylesim {one.about['versions']['stylesim']}" for one in evaluations), "")
-    return f"{len(evaluations)} forecaster(s); corpora: {names or 'none'}{versions}."
+    return f"{plural(len(evaluations), 'forecaster')}; corpora: {names or 'none'}{versions}."
