@@ -14,6 +14,7 @@ import subprocess
 import sys
 from collections import Counter
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -41,6 +42,7 @@ PACKAGES: dict[str, Sequence[Sequence[str]]] = {  # arguments of pip, one call e
     "av2": [["av2==0.3.6"]],
     "commonroad": [["commonroad-io==2026.1"]],
     "metadrive": [["metadrive-simulator==0.4.3"]],
+    "tactics2d": [["tactics2d==0.1.9"]],
     # Waymo's package pins numpy 1.21 for its metrics; the protos that trajdata wants of it need none of that.
     "trajdata": [["trajdata==1.4.0", "numpy<2", "tensorflow-cpu==2.11.0", "intervaltree"],
                  ["--no-deps", "waymo-open-dataset-tf-2-11-0"]],
@@ -214,6 +216,21 @@ def test_metadrive_finds_the_database_sane(tmp_path: Path, corpus: Corpus, envir
         compare_lanes(found["lanes"], scene, same(lanes_of(scene)))
         if scene.signals is not None:
             compare_lights(found["lights"], scene, same(lanes_of(scene)), words)
+    assert not read["scenes"]
+    assert compared == counts["agent_frames"]
+
+
+def test_tactics2d_loads_recordings(tmp_path: Path, corpus: Corpus, environments: Path) -> None:
+    counts = export("levelx", corpus, out=tmp_path / "out", labels=["commanded"])
+    read = read_by("tactics2d", environments, tmp_path / "out")
+    compared = 0
+    for number, scene in enumerate(corpus):
+        found, tracks = read["scenes"].pop(str(number))["agents"], scene.tracks
+        for agent in found.values():  # the format counts from the recording's origin
+            agent["position"] = (np.array(agent["position"]) + tracks.origin_m).tolist()
+        seen = tracks.select(tracks.valid.any(axis=1))
+        names = {name: str(i) for i, name in enumerate(tracks.agent_id)}
+        compared += compare_agents(found, replace(scene, tracks=seen), names)
     assert not read["scenes"]
     assert compared == counts["agent_frames"]
 
