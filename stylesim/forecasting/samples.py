@@ -17,7 +17,7 @@ from jaxtyping import Int32, Int64
 from stylesim.corpus import Corpus
 from stylesim.corpus.files import storage_error
 from stylesim.forecasting.config import InputConfig
-from stylesim.forecasting.snapshot import RoadArrays, agent_arrays, gave_evidence, lane_signals, road_arrays
+from stylesim.forecasting.snapshot import RoadArrays, agent_arrays, evidence, lane_signals, road_arrays
 from stylesim.forecasting.store import NO_ROAD, FileSink, SampleStore, StoreBuilder
 from stylesim.road import Road
 from stylesim.scene import Scene
@@ -59,10 +59,13 @@ class RoadCutter:
     def __init__(self, config: InputConfig) -> None:
         self._config = config
         self._cut: WeakKeyDictionary[Road, RoadArrays] = WeakKeyDictionary()
+        self._evidence: WeakKeyDictionary[Road, frozenset[str]] = WeakKeyDictionary()
 
     def arrays(self, road: Road, track_id: str) -> RoadArrays:
         """The road as the driver of that track may see it."""
-        if gave_evidence(road, track_id):
+        if road not in self._evidence:
+            self._evidence[road] = evidence(road)
+        if track_id in self._evidence[road]:
             return road_arrays(road, self._config, without=track_id)
         if road not in self._cut:
             self._cut[road] = road_arrays(road, self._config)

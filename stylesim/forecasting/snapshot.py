@@ -120,9 +120,9 @@ def road_arrays(road: Road, config: InputConfig, *, without: str = "") -> RoadAr
     )
 
 
-def gave_evidence(road: Road, track_id: str) -> bool:
-    """True if that track is among those from which a lane of this road was inferred."""
-    return any(lane.evidence is not None and track_id in lane.evidence.track_id for lane in road.lanes)
+def evidence(road: Road) -> frozenset[str]:
+    """The tracks from which lanes of this road were inferred."""
+    return frozenset(track for lane in road.lanes if lane.evidence is not None for track in lane.evidence.track_id)
 
 
 def lane_signals(road: Road, signals: Signals, config: InputConfig) -> Float32[np.ndarray, "lane 2"]:

@@ -5,7 +5,7 @@ import math
 import torch
 
 from stylesim.forecasting.head import Modes
-from stylesim.forecasting.objective import mixture_loss, responsible_query
+from stylesim.forecasting.objective import SAME_M, mixture_loss, responsible_query, right_queries
 from stylesim.forecasting.selection import selected_modes
 
 
@@ -65,10 +65,21 @@ def test_the_query_with_the_nearest_intention_is_responsible() -> None:
     assert responsible_query(anchor, future).tolist() == [2]
 
 
+def test_intentions_that_are_alike_are_nearly_equally_right_and_more_so_along_than_across() -> None:
+    anchor = paths([(0.0, 0.0), (1.0, 0.0), (0.0, 1.0), (10.0, 0.0)])
+    right = right_queries(anchor, paths([(0.0, 0.0)])[:, 0])
+    torch.testing.assert_close(right.sum(dim=1), torch.ones(1))
+    assert right[0, 0] > right[0, 1] > 0.9 * right[0, 0]
+    assert 0.5 * right[0, 0] < right[0, 2] < right[0, 1]
+    assert right[0, 3] < 1e-3
+
+
 def test_the_loss_is_the_gaussian_likelihood_and_the_cross_entropy() -> None:
     anchor = paths([(0.0, 0.0), (10.0, 0.0)])
     future = paths([(10.0, 0.0)])[:, 0]
     sd = 2.0
     modes = Modes(anchor + 2.0, torch.full_like(anchor, math.log(sd)), logit([0.25, 0.75]))
-    expected = 0.5 * (2.0 / sd) ** 2 + math.log(sd) - math.log(0.75)
+    other = math.exp(-0.5 * (10.0 / SAME_M[0]) ** 2)
+    cross_entropy = -(math.log(0.75) + other * math.log(0.25)) / (1 + other)
+    expected = 0.5 * (2.0 / sd) ** 2 + math.log(sd) + cross_entropy
     torch.testing.assert_close(mixture_loss([modes, modes], anchor, future), torch.tensor([expected]))
