@@ -26,6 +26,7 @@ from stylesim.corpus import Corpus, CorpusWriter
 from stylesim.datasets.reading import read
 from stylesim.experiments.arms import Arm
 from stylesim.experiments.running import run_experiment
+from stylesim.forecasting.robust import RobustSettings
 from stylesim.labelers.labelling import label
 from stylesim.labelers.reference import new_labeler
 from stylesim.merging.merge import merge
@@ -98,8 +99,6 @@ def synthetic(scenarios: Sequence[str], population: str, out: Path, *, episodes:
 
 def arms(rare: Corpus, usual: Corpus, by: str) -> list[Arm]:
     """The doses and the two controls."""
-    from stylesim.forecasting.robust import RobustSettings
-
     found = [Arm(BASE), Arm("real-balanced", {"robust": RobustSettings(("balanced",), by=by)})]
     for dose in DOSES:
         for name, corpus in (("rare", rare), ("usual", usual)):
@@ -116,6 +115,7 @@ def main() -> None:
     parser.add_argument("--steps", type=int, default=600)
     parser.add_argument("--seeds", type=int, default=5)
     parser.add_argument("--episodes", type=int, default=6, help="of each scenario and population")
+    parser.add_argument("--only", default="", help="names of arms, comma-separated")
     asked = parser.parse_args()
     torch.set_num_threads(1)
     name, what = asked.recording, RECORDINGS[asked.recording]
@@ -125,8 +125,9 @@ def main() -> None:
         synthetic(what.scenarios, crowd, asked.folder / f"{name}-{crowd}", episodes=asked.episodes, plain=plain)
         for crowd in ("rare_heavy", "naturalistic")
     )
+    chosen = [arm for arm in arms(rare, usual, what.by) if not asked.only or arm.name in asked.only.split(",")]
     result = run_experiment(
-        arms(rare, usual, what.by),
+        chosen,
         corpus=corpus,
         seeds=range(asked.seeds),
         steps=asked.steps,
