@@ -114,6 +114,7 @@ def main() -> None:
     parser.add_argument("--size", default="mini")
     parser.add_argument("--steps", type=int, default=600)
     parser.add_argument("--seeds", type=int, default=5)
+    parser.add_argument("--first-seed", type=int, default=0, help="so that two processes can share the seeds")
     parser.add_argument("--episodes", type=int, default=6, help="of each scenario and population")
     parser.add_argument("--only", default="", help="names of arms, comma-separated")
     asked = parser.parse_args()
@@ -129,7 +130,7 @@ def main() -> None:
     result = run_experiment(
         chosen,
         corpus=corpus,
-        seeds=range(asked.seeds),
+        seeds=range(asked.first_seed, asked.first_seed + asked.seeds),
         steps=asked.steps,
         size=asked.size,
         spec=SPEC,
