@@ -33,10 +33,12 @@ def show(found: Placebo) -> None:
 def main() -> None:
     parser = options(__doc__, seeds=10, steps=400, size="mini")
     parser.add_argument("--history", type=float, default=SPEC.history_s, help="seconds; the shorter, the less it tells")
+    parser.add_argument("--lr", type=float, help="peak learning rate of all arms; that of train without it")
     asked = parser.parse_args()
     spec = replace(SPEC, history_s=asked.history)
     shorter = "" if spec == SPEC else f"-history{asked.history:g}"
-    out = asked.out / f"placebo-{asked.size}-{asked.steps}{shorter}"
+    faster = "" if asked.lr is None else f"-lr{asked.lr:g}"
+    out = asked.out / f"placebo-{asked.size}-{asked.steps}{shorter}{faster}"
     if asked.show:
         found = placebo_of(out, condition=CONDITION)
     else:
@@ -49,6 +51,7 @@ def main() -> None:
             condition=CONDITION,
             size=asked.size,
             spec=spec,
+            lr=asked.lr,
             progress=lambda name, done, total: print(f"{done}/{total} {name}", flush=True),
         )
     show(found)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -85,6 +85,7 @@ def placebo(
     condition: str = "tdbm",
     fusion: str = "early",
     size: str = "tiny",
+    lr: float | None = None,
     spec: WindowSpec = WindowSpec(),
     margin: float = MARGIN,
     cache: Path | None = None,
@@ -96,14 +97,16 @@ def placebo(
     need splits. In `world`, neither `condition` nor the commanded style (the oracle) may change the test minFDE; in
     `control`, the oracle must gain over the model that is told nothing and over itself with its labels permuted within
     scenario and context, and with these it must not gain. The folder `out` holds the runs; the same call again goes on.
-    InputError where `world` is no placebo or `control` is one.
+    `lr` is the peak learning rate of all arms (None: that of `train`). InputError where `world` is no placebo or
+    `control` is one.
     """
     check_worlds(world, control)
-    told = {"condition": condition, "fusion": fusion}
-    oracle = Arm(ORACLE, {"condition": ORACLE, "fusion": fusion}, permuted=True)
+    common = {} if lr is None else {"lr": lr}
+    none = Arm(NONE, common)
+    told, oracle = (Arm(name, {"condition": name, "fusion": fusion, **common}) for name in (condition, ORACLE))
     plans = {
-        PLACEBO_WORLD: (world, [Arm(NONE), Arm(condition, told), Arm(ORACLE, oracle.options)]),
-        CONTROL_WORLD: (control, [Arm(NONE), oracle]),
+        CONTROL_WORLD: (control, [none, replace(oracle, permuted=True)]),
+        PLACEBO_WORLD: (world, [none, told, oracle]),
     }
     for name, (corpus, arms) in plans.items():
         run_experiment(
