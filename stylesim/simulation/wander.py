@@ -21,7 +21,7 @@ STEERING_RAD_PER_S = 4.0  # of lane changes; chosen, because the lag (2 / 4 s) s
 LARGEST_SLIDE_MPS = 1.5  # lateral speed of a lane change at 5 m/s or more, so at most 0.3 of the speed below; chosen
 LARGEST_ACCELERATION_MPS2 = 3.5  # chosen, because 4 m/s2 must hold with what a change of speed adds
 FULL_SPEED_MPS = 5.0  # from there on time runs at its own pace; chosen, because 5 m/s is walking out of a queue
-ROOM_BEYOND_LANE_M = 0.2  # how far a bold driver's side may reach over the marking; chosen
+ROOM_BEYOND_LANE_M = 0.0  # the side reaches the marking and no further: who drives beside may wander, too; chosen
 
 
 def filter_gain(correlation_time_s: Float64[np.ndarray, " agent"]) -> Float64[np.ndarray, " agent"]:
