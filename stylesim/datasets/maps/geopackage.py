@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 import sqlite3
 import struct
+from typing import Any
 
 import numpy as np
 from jaxtyping import Float64
@@ -18,12 +19,12 @@ _WGS_84 = 4326
 MAX_POINTS = 1_000_000  # chosen: of one geometry; a damaged number of points would ask for any memory
 
 
-def geometry(blob: bytes) -> Float64[np.ndarray, "point 2"]:
+def geometry(blob: Any) -> Float64[np.ndarray, "point 2"]:
     """The points of a line, of the outline of an area, or of the longest one of several; in the order of the file.
 
     ValueError for any other geometry, an empty one, and what is no GeoPackage geometry.
     """
-    if len(blob) < 8 or blob[:2] != b"GP":
+    if not isinstance(blob, bytes) or len(blob) < 8 or blob[:2] != b"GP":
         raise ValueError("a geometry does not begin as one of a GeoPackage")
     flags = blob[3]
     begin = 8 + _ENVELOPE_BYTES.get(flags >> 1 & 7, len(blob))

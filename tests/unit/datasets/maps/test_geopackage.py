@@ -45,6 +45,8 @@ def test_an_area_is_its_outline_and_of_several_the_longest_counts():
     ("blob", "says"),
     [
         (b"", "does not begin"),
+        ("GP and a text", "does not begin"),
+        (None, "does not begin"),
         (packed(b""), "cut off"),
         (packed(line(XY))[:-1], "cut off"),
         (packed(struct.pack("<BII", 1, 2, 4000)), "cut off"),
