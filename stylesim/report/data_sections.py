@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from stylesim.corpus import Corpus
+from stylesim.evaluation.approaches import yellow_approaches
 from stylesim.evaluation.label_summary import LabelSummary, label_summary
-from stylesim.evaluation.yellow import yellow_decisions
 from stylesim.report import style_figures
 from stylesim.report.blocks import Block, Section, picture
 from stylesim.report.picture import scene_figure
@@ -41,17 +41,20 @@ def _confusion_blocks(summaries: Sequence[LabelSummary]) -> list[Block]:
 
 
 def yellow_section(corpora: Sequence[Corpus]) -> Section | None:
-    """Stop or go by time to the stop line; None where no driver carries a decision."""
+    """Who stopped and who went, by time to the stop line; None where no commanded driver met a yellow."""
     blocks: list[Block] = []
     for corpus in corpora:
-        decisions = yellow_decisions(corpus)
-        if decisions is not None:
-            counts = ", ".join(f"{name}: {count}" for name, count in decisions.counts.items())
+        found = yellow_approaches(corpus)
+        if len(found):
+            counts = ", ".join(f"{name}: {count}" for name, count in found.counts.items())
+            known = found.decided >= 0
+            differ = int((known & ((found.decided == 1) != found.stopped)).sum())
             caption = (
-                f"{corpus.path.name}: {plural(len(decisions), 'decision')} of "
-                f"{plural(len(set(decisions.unit)), 'episode')} ({counts})."
+                f"{corpus.path.name}: {plural(len(found), 'drive')} up to a yellow in "
+                f"{plural(len(set(found.unit)), 'episode')} ({counts}), read from the tracks. {differ} of "
+                f"{int(known.sum())} did otherwise than their drivers had decided at the onset."
             )
-            blocks += picture(style_figures.stop_probability_figure(decisions), caption)
+            blocks += picture(style_figures.stop_probability_figure(found), caption)
     return Section("yellow", "The decision at the yellow", (), tuple(blocks)) if blocks else None
 
 

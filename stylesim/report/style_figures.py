@@ -10,8 +10,8 @@ from matplotlib.figure import Figure
 from scipy.special import expit
 from scipy.stats import binomtest
 
+from stylesim.evaluation.approaches import MAX_TTS_S, Approaches
 from stylesim.evaluation.label_summary import RANK_CEILING, LabelSummary, SourceSummary
-from stylesim.evaluation.yellow import MAX_TTS_S, YellowDecisions
 from stylesim.report.theme import SERIES_COLOUR, UNJUDGED_COLOUR, drawing, new_figure, style_colour
 from stylesim.style import STYLE_CLASSES
 
@@ -105,45 +105,45 @@ def rank_note(summary: LabelSummary) -> str:
     return f"Spearman between the commanded knob and the measured aggressiveness: {rank:.2f}{ceiling}."
 
 
-def stop_probability_figure(decisions: YellowDecisions) -> Figure:
-    """Who decided to stop, by time to the stop line at the onset of yellow and commanded style.
+def stop_probability_figure(found: Approaches) -> Figure:
+    """Who stopped before the line, by time to it at the onset of yellow and commanded style.
 
-    Every decision is a tick, those to stop above, those to go below, one row per style; the points are shares of all
+    Every approach is a tick, who stopped above, who went below, one row per style; the points are shares of all
     styles together in bins, with Wilson 95 % intervals.
     """
     k, m = NEUTRAL_YELLOW
-    style = np.array(decisions.style, dtype=object)
+    style = np.array(found.style, dtype=object)
     with drawing():
         figure, (axes,) = new_figure(WIDTH, 4.4)
         fine = np.linspace(0, MAX_TTS_S, 200)
         neutral = f"literature (k {k} 1/s, m {m} s)"
         axes.plot(fine, expit(k * (fine - m)), color=UNJUDGED_COLOUR, ls="--", lw=1.4, label=neutral)
-        _pooled(axes, decisions)
+        _pooled(axes, found)
         present = [name for name in (*STYLE_CLASSES, "neutral") if (style == name).any()]
         for row, name in enumerate(present, start=1):
-            tts, stopped = decisions.tts_s[style == name], decisions.stopped[style == name]
+            tts, stopped = found.tts_s[style == name], found.stopped[style == name]
             place = np.where(stopped, 1.0 + ROW * row, -ROW * row)
             axes.scatter(tts, place, marker="|", s=26, color=style_colour(name), label=f"{name}, n = {len(tts)}")
         axes.set_xlim(0, MAX_TTS_S)
         axes.set_ylim(-ROW * (len(present) + 1), 1 + ROW * (len(present) + 1))
         axes.set_yticks(np.linspace(0, 1, 6))
         axes.set_xlabel("time to the stop line at the onset of yellow (s)")
-        axes.set_ylabel("share that decides to stop")
-        axes.set_title("Stop (ticks above) or go (below) at the yellow, by commanded style")
+        axes.set_ylabel("share that stops before the line")
+        axes.set_title("Stopped (ticks above) or went (below) at the yellow, by commanded style")
         figure.legend(loc="outside lower center", ncols=4)
     return figure
 
 
-def _pooled(axes: Axes, decisions: YellowDecisions) -> None:
-    """Shares of all styles together, in bins of at least PER_POINT decisions."""
-    place = np.floor(decisions.tts_s / TTS_BIN_S)
+def _pooled(axes: Axes, found: Approaches) -> None:
+    """Shares of all styles together, in bins of at least PER_POINT approaches."""
+    place = np.floor(found.tts_s / TTS_BIN_S)
     bins = [place == number for number in range(int(MAX_TTS_S / TTS_BIN_S)) if (place == number).sum() >= PER_POINT]
     if not bins:
         return
-    found = [binomtest(int(decisions.stopped[b].sum()), int(b.sum())) for b in bins]
-    share = np.array([test.statistic for test in found])
-    ends = np.array([test.proportion_ci(method="wilson") for test in found])
-    middle = [decisions.tts_s[b].mean() for b in bins]
+    tests = [binomtest(int(found.stopped[b].sum()), int(b.sum())) for b in bins]
+    share = np.array([test.statistic for test in tests])
+    ends = np.array([test.proportion_ci(method="wilson") for test in tests])
+    middle = [found.tts_s[b].mean() for b in bins]
     label = f"all styles, {TTS_BIN_S:g} s bins"
     error = [share - ends[:, 0], ends[:, 1] - share]
     axes.errorbar(middle, share, yerr=np.maximum(error, 0), fmt="o", ms=4.5, lw=1.2, color="#1f2933", label=label)

@@ -4,7 +4,6 @@ import numpy as np
 import pytest
 
 from stylesim.evaluation.label_summary import label_summary
-from stylesim.evaluation.yellow import yellow_decisions
 
 
 def test_shares_and_confusion(small_corpus):
@@ -27,19 +26,3 @@ def test_shares_and_confusion(small_corpus):
 def test_recorded_drivers_have_no_confusion(world, tmp_path):
     corpus = world.write(tmp_path / "real", [world.scene(0, source="dlr_ut")])
     assert label_summary(corpus).confusion is None
-    assert yellow_decisions(corpus) is None
-
-
-def test_time_to_the_stop_line(world, tmp_path):
-    scene = world.scene(3)
-    found = yellow_decisions(world.write(tmp_path / "one", [scene]))
-    tracks, onset = scene.tracks, 40
-    expected = {}
-    for agent in range(1, 5):
-        gap = 150.0 - 4.5 / 2 - tracks.position_m[agent, onset, 0]
-        expected[agent] = gap / tracks.speed_mps[agent, onset]
-    kept = {agent: time for agent, time in expected.items() if 0 < time <= 10}
-    np.testing.assert_allclose(found.tts_s, list(kept.values()), rtol=1e-3)
-    assert found.stopped.tolist() == [agent % 2 == 0 for agent in kept]
-    assert found.counts["decided"] == 6
-    assert sum(found.counts.values()) == 6 + 6 - len(kept)
