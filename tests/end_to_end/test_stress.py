@@ -59,7 +59,7 @@ def test_the_whole_examination(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) 
     }
     stopped = pl.col("taken") == "stop"
     held = {name: table.filter(stopped)["covered"].mean() for name, table in decided.items()}
-    assert held["constant_velocity"] == 0.0  # it never stops
+    assert held["constant_velocity"] < 0.1  # it stops for nobody; at most a course beside the lane falls short
     assert held["kinematic_fan"] > 0.2  # one of six arcs brakes
 
     said = stylesim("compare", "stress/kinematic_fan.stress.json", "stress/feet.stress.json", "--report", "both.html")
