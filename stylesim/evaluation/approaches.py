@@ -117,7 +117,7 @@ def _of_scene(scene: Scene, counts: Counter[str]) -> Iterator[tuple[object, ...]
     for frame, lights in onsets(scene).items():
         assert scene.signals is not None
         here = np.flatnonzero(tracks.valid[:, frame])
-        if not len(here):
+        if not (len(here) and lights):  # nobody, or no light whose lane has a stop line
             continue
         ahead, away, line_at = places(tracks.position_m[here, frame], half[here], [lane for _, lane in lights])
         nearest = np.argmin(away, axis=0)

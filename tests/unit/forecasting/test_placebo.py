@@ -55,6 +55,7 @@ def world(*, matters: bool, samples: int, seed: int) -> World:
         piece_attribute=np.zeros((samples, 1, 14), np.float32),
         piece_valid=np.zeros((samples, 1), bool),
         pose=np.zeros((samples, 3), np.float32),
+        agent_row=np.zeros((samples, 1), np.int64),
     )
     time = np.arange(1, CONFIG.future_steps + 1) * CONFIG.dt_s
     along = torch.from_numpy((speed[:, None] * time + 0.5 * change[:, None] * time**2).astype(np.float32))
