@@ -30,7 +30,9 @@ CORRECTS_RAD_PER_S, DAMPING = (
     1.5,
     0.5,
 )  # chosen, because people correct their speed within a few seconds, not quite calmly
-STIFF_RAD_PER_S = 3.0  # while an emergency lasts, and for what lies beyond `FREE_M`; chosen: two thirds of a second
+# While an emergency lasts, towards a stand, and for what lies beyond `FREE_M`; chosen: two thirds of a second.
+STIFF_RAD_PER_S = 3.0
+SUDDEN = 2.0  # times the jerk of a calm foot; chosen, between it and the 2.5 with which hard stops begin
 FREE_M = 1.5  # deviation that the calm correction is left with; chosen, three sds of 0.8 m/s2 of noise
 CALM_MPS = 6.0  # below this speed the restlessness fades: who stands does not press; chosen, walking out of a queue
 LAST_MPS2 = 0.3  # of braking, in the last moment before standing; chosen, because it is not felt
@@ -90,9 +92,11 @@ class Foot:
         pressed = self._pressed[rows] + (target - self._pressed[rows]) * (dt / LAG_S)
         pace = np.minimum(before / CALM_MPS, 1.0)
         push = pace * pace * (3.0 - 2.0 * pace) * pressed
-        hard = wished < -HARD_MPS2
-        spring = np.where(hard, STIFF_RAD_PER_S, CORRECTS_RAD_PER_S)
-        push -= 2.0 * np.where(hard, 1.0, DAMPING) * spring * rate + spring**2 * ahead
+        # A stop beyond the limit builds up faster than a calm foot follows: it is told by its beginning, too.
+        hard = (wished < -HARD_MPS2) | ((wished < 0.0) & (wished - last < -SUDDEN * JERK_MPS3 * dt))
+        exact = np.where(hard, 1.0, 1.0 - pace)  # who comes to a stand does so where he meant to, not over the line
+        spring = CORRECTS_RAD_PER_S + (STIFF_RAD_PER_S - CORRECTS_RAD_PER_S) * exact
+        push -= 2.0 * (DAMPING + (1.0 - DAMPING) * exact) * spring * rate + spring**2 * ahead
         push -= STIFF_RAD_PER_S**2 * (ahead - np.minimum(np.maximum(ahead, -FREE_M), FREE_M))
         lowest = np.maximum(np.where(hard, -EMERGENCY_MPS2, -HARD_MPS2), -LAST_MPS2 - np.sqrt(2.0 * JERK_MPS3 * before))
         change = np.where(hard, HARD_JERK_MPS3, JERK_MPS3) * dt

@@ -18,7 +18,7 @@ def interrupt(*_: object, **__: object) -> None:
 @pytest.mark.parametrize(
     ("words", "target", "hint"),
     [
-        (["merge", "corpus", "--out", "new"], "stylesim.merging.merge._scenes", "--resume"),
+        (["merge", "corpus", "--out", "new"], "stylesim.merging.merge.planned_scenes", "--resume"),
         (["label", "corpus"], "stylesim.labelers.labelling.target_agents", "to start anew"),
         (["train", "corpus", "--out", "new"], "stylesim.forecasting.loop.Loop.run", "--resume"),
         (["evaluate", "constant_velocity", "corpus", "--by", "scenario", "--out", "new"],
@@ -40,11 +40,11 @@ def test_ctrl_c_says_how_to_go_on(words, target, hint, stylesim, corpus, tmp_pat
 
 
 def test_a_merge_goes_on_where_it_was_stopped(stylesim, corpus, tmp_path, monkeypatch):
-    from stylesim.merging import merge
+    from stylesim.merging import plan
 
     write_corpus(tmp_path / "many", 70, splits=False)
     seen = 0
-    original = merge.on_common_clock
+    original = plan.on_common_clock
 
     def stop_late(*args, **kwargs):
         nonlocal seen
@@ -52,7 +52,7 @@ def test_a_merge_goes_on_where_it_was_stopped(stylesim, corpus, tmp_path, monkey
         return original(*args, **kwargs) if seen < 40 else interrupt()
 
     with monkeypatch.context() as patched:
-        patched.setattr(merge, "on_common_clock", stop_late)
+        patched.setattr(plan, "on_common_clock", stop_late)
         assert stylesim("merge", tmp_path / "many", "--out", tmp_path / "new").code == 130
     assert not (tmp_path / "new").exists()
     said = stylesim("merge", tmp_path / "many", "--out", tmp_path / "new")

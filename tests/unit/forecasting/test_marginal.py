@@ -83,7 +83,10 @@ def test_modes_of_all_styles_are_weighed_and_merged_where_they_agree() -> None:
     both = averaged([brakes, drives], np.array([[0.75, 0.25]]), count=3, apart_m=2.5)
     ends = both.mode_m[0, :, -1, 0]
     assert ends.tolist() == [0.0, 10.5, 50.0]
-    np.testing.assert_allclose(both.probability[0], [0.675, 0.175, 0.15], atol=1e-6)
+    end, weight = np.array([0.0, 10.0, 50.0, 10.5]), np.array([0.675, 0.075, 0.15, 0.1])  # of the mixture
+    width = (np.abs(end - 0.0) * weight).sum()  # what the best single answer is expected to be wrong
+    density = [(np.exp(-0.5 * ((end - kept) / width) ** 2) * weight).sum() for kept in ends]
+    np.testing.assert_allclose(both.probability[0], np.array(density) / np.sum(density), atol=1e-6)
 
 
 def test_a_style_of_probability_zero_plays_no_part() -> None:

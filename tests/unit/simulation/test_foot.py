@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from stylesim.simulation.foot import FREE_M, JUMP_MPS2, Foot, footed, noise_gain
+from stylesim.simulation.foot import FREE_M, JUMP_MPS2, SUDDEN, Foot, footed, noise_gain
 from stylesim.simulation.stopping import EMERGENCY_MPS2, HARD_JERK_MPS3, HARD_MPS2, JERK_MPS3
 from stylesim.simulation.wander import WanderSwitch
 from stylesim.styles import style_table
@@ -54,10 +54,20 @@ def test_acceleration_and_jerk_are_bounded_whatever_the_model_does(seed: int, sd
     moving = speed[:, 2:] > 0.0  # what is left of the braking ends where the vehicle stands
     jerk = np.where(moving, np.diff(speed, n=2, axis=1) / DT_S**2, 0.0)
     assert np.abs(jerk).max() <= HARD_JERK_MPS3 + 1e-6
-    calm = harsh(seed)
-    hard = np.diff(calm, axis=1, prepend=calm[:, :1]) / DT_S < -HARD_MPS2
-    assert np.abs(np.where(hard[:, 2:], 0.0, jerk)).max() <= JERK_MPS3 + 1e-6
+    wished = np.diff(harsh(seed), axis=1) / DT_S
+    sudden = wished[:, 1:] - acceleration[:, :-1] < -SUDDEN * JERK_MPS3 * DT_S  # of the model, from how one drives
+    hard = (wished[:, 1:] < -HARD_MPS2) | (sudden & (wished[:, 1:] < 0.0))
+    assert np.abs(np.where(hard, 0.0, jerk)).max() <= JERK_MPS3 + 1e-6
     assert np.isfinite(ahead).all()
+
+
+def test_a_hard_stop_ends_where_it_was_planned() -> None:
+    """7 m/s2 built up with 30 m/s3, as a stop at the yellow that is just possible."""
+    wished = np.concatenate([np.zeros(50), -np.minimum(3.0 * np.arange(1, 40), 7.0), np.zeros(40)])
+    model = np.maximum(0.0, 20.0 + np.cumsum(wished) * DT_S)[None]
+    ahead, speed = driven([0.0], model)
+    assert speed[0, -1] == 0.0
+    assert np.abs(ahead).max() < 0.2
 
 
 def test_it_stops_where_the_model_stops() -> None:

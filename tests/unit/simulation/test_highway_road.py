@@ -10,9 +10,10 @@ from highway_env.road.lane import StraightLane
 
 from stylesim.population import Population
 from stylesim.scenario import load_scenario
+from stylesim.simulation.highway.graph import bend_radius_m
 from stylesim.simulation.highway.junction import JUNCTION_NODES, Junction
 from stylesim.simulation.highway.lanes import road_of
-from stylesim.simulation.highway.path import curve_speed_mps
+from stylesim.simulation.highway.path import BEFORE_BEND, IN_BEND_MPS2, curve_speed_mps
 from stylesim.simulation.highway.quick import QuickStraightLane
 from stylesim.simulation.highway.right_of_way import RightOfWay
 from stylesim.simulation.highway.spec import options_of
@@ -81,9 +82,10 @@ def test_gaps_go_around_the_corner(junction):
 
 def test_curves_are_taken_at_a_speed_that_their_radius_allows(junction):
     near, far, straight = put(junction, 0, 3, 95.0), put(junction, 0, 3, 20.0), put(junction, 0, 2, 95.0)
-    right = junction.road.network.get_lane(("ir0", "il3", 0)).radius
-    assert curve_speed_mps(near, 2.5) == pytest.approx(np.sqrt(2.5 * right + 2 * 2.5 * 5.0))
-    assert curve_speed_mps(far, 2.5) > 15
+    right = bend_radius_m(junction.road.network.get_lane(("ir0", "il3", 0)))
+    across, before = min(2.5, IN_BEND_MPS2), 2.5 * BEFORE_BEND
+    assert curve_speed_mps(near, 2.5) == pytest.approx(np.sqrt(across * right + 2 * before * 5.0))
+    assert curve_speed_mps(far, 2.5) == pytest.approx(np.sqrt(across * right + 2 * before * 80.0))
     assert curve_speed_mps(straight, 2.5) == np.inf
 
 
