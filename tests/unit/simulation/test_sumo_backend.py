@@ -91,7 +91,7 @@ def test_tracks_are_smooth_and_consistent(scenes: list[Scene]) -> None:
         assert np.quantile(slip, 0.999) < 0.1
         standing = both & (np.hypot(*np.moveaxis(step, -1, 0)) == 0.0)
         # who creeps by less than float32 positions can show may turn by as little
-        assert np.abs(np.diff(tracks.heading_rad, axis=1)[standing]).max() < 1e-6
+        assert np.abs(np.diff(tracks.heading_rad, axis=1)[standing]).max(initial=0.0) < 1e-6
 
 
 def test_every_track_is_logged_from_three_seconds_after_entry(backend: SumoBackend, tmp_path: Path) -> None:
