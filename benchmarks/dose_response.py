@@ -22,6 +22,7 @@ from pathlib import Path
 import torch
 
 from benchmarks.arms_table import print_table
+from benchmarks.worlds import seeds_of, told
 from stylesim.corpus import Corpus, CorpusWriter
 from stylesim.datasets.reading import read
 from stylesim.experiments.arms import Arm
@@ -130,13 +131,13 @@ def main() -> None:
     result = run_experiment(
         chosen,
         corpus=corpus,
-        seeds=range(asked.first_seed, asked.first_seed + asked.seeds),
+        seeds=seeds_of(asked),
         steps=asked.steps,
         size=asked.size,
         spec=SPEC,
         out=asked.folder / f"{name}-{asked.size}-{asked.steps}",
         cache=asked.folder / "cache",
-        progress=lambda arm, done, total: print(f"{done}/{total} {arm}", flush=True),
+        progress=told,
     )
     units = {info.unit_id.split("/")[0] for info in corpus.info}
     print(f"{name}, {asked.size}, {asked.steps} steps; site(s): {', '.join(sorted(units))}")

@@ -15,7 +15,7 @@ from pathlib import Path
 
 from benchmarks import dose_response
 from benchmarks.tables import estimate_text
-from benchmarks.worlds import SPEC, options, simulated
+from benchmarks.worlds import SPEC, options, seeds_of, simulated, told
 from stylesim.corpus import Corpus
 from stylesim.experiments.arms import Arm
 from stylesim.experiments.results import Experiment
@@ -102,12 +102,12 @@ def main() -> None:
         run_experiment(
             list(arms(method).values()),
             corpus=corpus,
-            seeds=range(asked.first_seed, asked.first_seed + asked.seeds),
+            seeds=seeds_of(asked),
             steps=asked.steps,
             out=out,
             size=asked.size,
             spec=spec,
-            progress=lambda run, done, total: print(f"{done}/{total} {run}", flush=True),
+            progress=told,
         )
     show(Experiment.load(out), method)
 

@@ -14,7 +14,7 @@ from __future__ import annotations
 from dataclasses import replace
 
 from benchmarks.tables import estimate_text
-from benchmarks.worlds import SPEC, options, simulated
+from benchmarks.worlds import SPEC, options, seeds_of, simulated, told
 from stylesim.experiments.placebo import CONTROL_WORLD, PLACEBO_WORLD, Placebo, placebo, placebo_of
 from stylesim.experiments.results import Experiment
 
@@ -45,14 +45,14 @@ def main() -> None:
         found = placebo(
             simulated(asked.out, "placebo"),
             simulated(asked.out, "tdbm_spectrum"),
-            seeds=range(asked.first_seed, asked.first_seed + asked.seeds),
+            seeds=seeds_of(asked),
             steps=asked.steps,
             out=out,
             condition=CONDITION,
             size=asked.size,
             spec=spec,
             lr=asked.lr,
-            progress=lambda name, done, total: print(f"{done}/{total} {name}", flush=True),
+            progress=told,
         )
     show(found)
     for name in (PLACEBO_WORLD, CONTROL_WORLD):

@@ -17,6 +17,7 @@ from pathlib import Path
 import torch
 
 from benchmarks.arms_table import print_table
+from benchmarks.worlds import seeds_of, told
 from stylesim.corpus import Corpus
 from stylesim.experiments.arms import Arm
 from stylesim.experiments.running import run_experiment
@@ -81,13 +82,13 @@ def main() -> None:
         chosen,
         corpus=train,
         test=judged,
-        seeds=range(asked.first_seed, asked.first_seed + asked.seeds),
+        seeds=seeds_of(asked),
         steps=asked.steps,
         size=asked.size,
         spec=SPEC,
         out=asked.folder / f"{asked.size}-{asked.steps}",
         cache=asked.folder / "cache",
-        progress=lambda what, done, total: print(f"{done}/{total} {what}", flush=True),
+        progress=told,
     )
     for by in ("commanded", "tdbm"):
         print_table(result, BASE, by)

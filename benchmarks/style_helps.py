@@ -16,7 +16,7 @@ Resumable: repeat the command; a second process may take other seeds (`--first-s
 from __future__ import annotations
 
 from benchmarks.tables import estimate_text
-from benchmarks.worlds import SPEC, options, simulated
+from benchmarks.worlds import SPEC, options, seeds_of, simulated, told
 from stylesim.experiments.arms import Arm
 from stylesim.experiments.placebo import MARGIN
 from stylesim.experiments.results import Experiment
@@ -74,12 +74,12 @@ def main() -> None:
         run_experiment(
             arms(),
             corpus=simulated(asked.out, "tdbm_spectrum"),
-            seeds=range(asked.first_seed, asked.first_seed + asked.seeds),
+            seeds=seeds_of(asked),
             steps=asked.steps,
             out=out,
             size=asked.size,
             spec=SPEC,
-            progress=lambda name, done, total: print(f"{done}/{total} {name}", flush=True),
+            progress=told,
         )
     show(Experiment.load(out))
 

@@ -55,6 +55,16 @@ def options(description: str | None, *, seeds: int, steps: int, size: str = "tin
     return parser
 
 
+def told(name: str, done: int, total: int) -> None:
+    """Say which run of an experiment is done."""
+    print(f"{done}/{total} {name}", flush=True)
+
+
+def seeds_of(asked: argparse.Namespace) -> range:
+    """The training seeds that the command line asks for."""
+    return range(asked.first_seed, asked.first_seed + asked.seeds)
+
+
 if __name__ == "__main__":
     asked = options(__doc__, seeds=0, steps=0).parse_args()
     for crowd in ("tdbm_spectrum", "placebo"):

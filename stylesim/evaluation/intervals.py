@@ -25,8 +25,32 @@ BLOCK = 4_000_000  # chosen: resampled values held at a time, 32 MB
 Status = Literal["general", "within site", "too few"]
 
 
+class Claim:
+    """What a value with an interval and a status may be asked, whatever it is a mean over."""
+
+    value: float
+    low: float
+    high: float
+    status: Status
+
+    @property
+    def refused(self) -> bool:
+        """True where there are too few drivers to say anything."""
+        return self.status == "too few"
+
+    @property
+    def excludes_zero(self) -> bool:
+        """True where the whole interval lies on one side of 0."""
+        return bool(self.low > 0 or self.high < 0)
+
+    def plain_numbers(self) -> dict[str, Any]:
+        """Value and interval as JSON values; None in place of NaN."""
+        numbers = {key: getattr(self, key) for key in ("value", "low", "high")}
+        return {key: (number if np.isfinite(number) else None) for key, number in numbers.items()}
+
+
 @dataclass(frozen=True)
-class Estimate:
+class Estimate(Claim):
     """A mean over drivers with its interval. `value`, `low` and `high` are NaN where the cell is refused.
 
     `status` is "general" (>= 30 drivers of >= 3 units: speaks of other units of the same kind), "within site" (fewer
@@ -40,21 +64,9 @@ class Estimate:
     n_units: int
     status: Status
 
-    @property
-    def refused(self) -> bool:
-        """True where there are too few drivers to say anything."""
-        return self.status == "too few"
-
-    @property
-    def excludes_zero(self) -> bool:
-        """True where the whole interval lies on one side of 0."""
-        return bool(self.low > 0 or self.high < 0)
-
     def to_dict(self) -> dict[str, Any]:
         """Plain JSON values; None in place of NaN."""
-        numbers = {key: getattr(self, key) for key in ("value", "low", "high")}
-        plain: dict[str, Any] = {key: (number if np.isfinite(number) else None) for key, number in numbers.items()}
-        return {**plain, "n_drivers": self.n_drivers, "n_units": self.n_units, "status": self.status}
+        return {**self.plain_numbers(), "n_drivers": self.n_drivers, "n_units": self.n_units, "status": self.status}
 
     @classmethod
     def from_dict(cls, raw: dict[str, Any]) -> Estimate:

@@ -19,15 +19,14 @@ from typing import Any
 import numpy as np
 from jaxtyping import Float64, Int64
 
-from stylesim.evaluation.intervals import LEVEL, Status, bootstrap_weights, status_of
+from stylesim.evaluation.intervals import DRAWS, LEVEL, Claim, Status, bootstrap_weights, status_of
 from stylesim.randomness import stream
 
-DRAWS = 2000  # as in `intervals`
 EQUIVALENCE_LEVEL = 0.90  # two one-sided tests at 5 %: the 90 % interval lies inside the margin (Schuirmann 1987)
 
 
 @dataclass(frozen=True)
-class SeededEstimate:
+class SeededEstimate(Claim):
     """A mean over drivers and seeds with its interval; all NaN where the cell is refused (see `Estimate`)."""
 
     value: float
@@ -38,16 +37,6 @@ class SeededEstimate:
     n_units: int
     n_seeds: int
     status: Status
-
-    @property
-    def refused(self) -> bool:
-        """True where there are too few drivers to say anything."""
-        return self.status == "too few"
-
-    @property
-    def excludes_zero(self) -> bool:
-        """True where the whole interval lies on one side of 0."""
-        return bool(self.low > 0 or self.high < 0)
 
     def within(self, margin: float) -> bool:
         """True where the whole interval lies strictly inside ±`margin`; ValueError unless `margin` is positive.
@@ -60,10 +49,8 @@ class SeededEstimate:
 
     def to_dict(self) -> dict[str, Any]:
         """Plain JSON values; None in place of NaN."""
-        numbers = {name: getattr(self, name) for name in ("value", "low", "high")}
-        plain: dict[str, Any] = {name: (number if np.isfinite(number) else None) for name, number in numbers.items()}
         sizes = {name: getattr(self, name) for name in ("level", "n_drivers", "n_units", "n_seeds", "status")}
-        return plain | sizes
+        return self.plain_numbers() | sizes
 
 
 def seeded_mean(

@@ -23,13 +23,9 @@ from stylesim.simulation.stopping import EMERGENCY_MPS2, HARD_JERK_MPS3, HARD_MP
 from stylesim.simulation.wander import WanderSwitch
 from stylesim.style import DriverStyle
 
-LAG_S = (
-    0.3  # of the foot behind its draws; chosen, because then 0.7 m/s2 of noise jerk by 8 m/s3 at the 99.9th percentile
-)
-CORRECTS_RAD_PER_S, DAMPING = (
-    1.5,
-    0.5,
-)  # chosen, because people correct their speed within a few seconds, not quite calmly
+# Of the foot behind its draws; chosen, because then 0.7 m/s2 of noise jerk by 8 m/s3 at the 99.9th percentile.
+LAG_S = 0.3
+CORRECTS_RAD_PER_S, DAMPING = 1.5, 0.5  # chosen, because people correct their speed in a few seconds, not quite calmly
 # While an emergency lasts, towards a stand, and for what lies beyond `FREE_M`; chosen: two thirds of a second.
 STIFF_RAD_PER_S = 3.0
 SUDDEN = 2.0  # times the jerk of a calm foot; chosen, between it and the 2.5 with which hard stops begin

@@ -127,7 +127,8 @@ def _views(corpora: Sequence[Corpus], names: Sequence[str], *, by_source: bool) 
         sources = sorted({one.source for one in corpus.info}) if by_source else []
         if len(sources) < 2:
             yield corpus, name
-        for source in sources if len(sources) > 1 else ():
+            continue
+        for source in sources:
             yield corpus.with_info(tuple(one for one in corpus.info if one.source == source)), f"{name}: {source}"
 
 

@@ -9,7 +9,7 @@ import numpy as np
 import polars as pl
 from jaxtyping import Bool, Float64
 
-from stylesim.evaluation.analysis.judge import DRIVER
+from stylesim.evaluation.analysis.judge import DRIVER, values_of
 from stylesim.evaluation.analysis.measure import Measured
 from stylesim.evaluation.analysis.parts import TRAIN, held_out_of
 from stylesim.evaluation.analysis.shares import NAMES
@@ -72,9 +72,7 @@ def clusters_of(one: Measured, *, seed: int) -> Clustered:
 
 
 def _sample(frame: pl.DataFrame) -> DriverSample:
-    value = np.stack([frame[f].cast(pl.Float64).fill_null(np.nan).to_numpy() for f in FEATURES], axis=1)
-    names = tuple(zip(frame["unit_id"].to_list(), frame["agent_id"].to_list(), strict=True))
-    return DriverSample(names, value, frame["highway"].to_numpy())
+    return DriverSample(tuple(frame.select(DRIVER).iter_rows()), values_of(frame), frame["highway"].to_numpy())
 
 
 def speed_tests(one: Measured, found: Clustered, *, seed: int) -> pl.DataFrame:

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 import polars as pl
+from jaxtyping import Float64
 
 from stylesim.evaluation.intervals import MIN_DRIVERS
 from stylesim.labelers.drivers import DriverSample
@@ -58,7 +59,8 @@ def fit_within(tables: dict[tuple[str, float], pl.DataFrame], options: FeatureOp
     (_, track_s), *histories = tables
     for frame in tables.values():
         usable = frame.filter(~pl.col("short") & ~pl.col("implausible"))
-        sizes = [usable.filter(half_of(usable) == half).drop_nulls(TDBM_FEATURES[0]).height for half in (0, 1)]
+        half = half_of(usable.drop_nulls(TDBM_FEATURES[0]))
+        sizes = [(half == number).sum() for number in (0, 1)]
         lacking = [f for f in TDBM_FEATURES if not usable[f].fill_nan(None).is_not_null().any()]
         if min(sizes) < MIN_DRIVERS or lacking:
             return Within(options, None)
@@ -78,14 +80,15 @@ def fit_within(tables: dict[tuple[str, float], pl.DataFrame], options: FeatureOp
 def _sample(frame: pl.DataFrame) -> DriverSample:
     """As `labelers.drivers` counts: full windows, plausible motion, no gap without a leader, no v_nei when alone."""
     usable = frame.filter(~pl.col("short") & ~pl.col("implausible")).sort(DRIVER)
-    value = _values(usable)
+    value = values_of(usable)
     value[usable["no_leader"].to_numpy(), FEATURES.index("s_front")] = np.nan
     value[usable["no_neighbours"].to_numpy(), FEATURES.index("v_nei")] = np.nan
     names = tuple(usable.select(DRIVER).iter_rows())
     return DriverSample(names, value, usable["highway"].to_numpy())
 
 
-def _values(frame: pl.DataFrame) -> np.ndarray:
+def values_of(frame: pl.DataFrame) -> Float64[np.ndarray, "row feature"]:
+    """The features of a frame's rows, NaN where unknown; an array of its own."""
     value = [frame[f].cast(pl.Float64).fill_null(np.nan).to_numpy() for f in FEATURES]
     return np.stack(value, axis=1).reshape(-1, len(FEATURES)).copy()
 
@@ -97,7 +100,7 @@ def rows_of(frame: pl.DataFrame, span: str, length_s: float) -> DriverRows:
         flags |= np.where(frame[key].to_numpy(), np.int32(flag), np.int32(0))
     zero = np.zeros(frame.height, np.int32)
     scene, agent = tuple(frame["scene_id"].to_list()), tuple(frame["agent_id"].to_list())
-    return DriverRows(span, length_s, scene, agent, zero, zero, _values(frame), flags)
+    return DriverRows(span, length_s, scene, agent, zero, zero, values_of(frame), flags)
 
 
 def with_tdbm(frame: pl.DataFrame, judge: Judge, span: str, length_s: float) -> pl.DataFrame:

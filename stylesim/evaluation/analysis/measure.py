@@ -65,8 +65,8 @@ def measured(
             frames.append(found.with_columns(pl.lit(part).alias("part")))
         if progress is not None:
             progress(done, len(corpus))
-    drivers = per_driver(pl.concat(tracks)) if tracks else per_driver(_frame(_no_rows(), ""))
-    every = pl.concat(windows) if windows else _windows_frame(_frame(_no_rows(), ""), 0.0)
+    drivers = per_driver(pl.concat(tracks)) if tracks else per_driver(frame_of(_no_rows(), ""))
+    every = pl.concat(windows) if windows else _windows_frame(frame_of(_no_rows(), ""), 0.0)
     parked = pl.col("v_avg") <= options.parked_within_m / options.window_s
     unknown = pl.col("v_avg").is_null() | pl.col("v_avg").is_nan()
     driving = drivers.filter(~parked & ~unknown)
@@ -108,9 +108,9 @@ def _scene_frames(scene: Scene, options: FeatureOptions) -> tuple[pl.DataFrame, 
         value=chosen.value[:, 0],
         flags=flags.astype(np.int32),
     )
-    numbered = [_windows_frame(_frame(rows, scene.unit_id, scene.start_s), length)
+    numbered = [_windows_frame(frame_of(rows, scene.unit_id, scene.start_s), length)
                 for rows, length in ((long, options.window_s), (short, SHORT_WINDOW_S))]  # fmt: skip
-    return _frame(tracks, scene.unit_id, scene.start_s), pl.concat(numbered)
+    return frame_of(tracks, scene.unit_id, scene.start_s), pl.concat(numbered)
 
 
 def _windows_frame(frame: pl.DataFrame, length_s: float) -> pl.DataFrame:
@@ -124,7 +124,8 @@ def _no_rows() -> DriverRows:
     return DriverRows("track", 11.0, (), (), empty, empty, np.zeros((0, len(FEATURES))), empty)
 
 
-def _frame(rows: DriverRows, unit_id: str, start_s: float = 0.0) -> pl.DataFrame:
+def frame_of(rows: DriverRows, unit_id: str, start_s: float = 0.0) -> pl.DataFrame:
+    """One row per row of features: who, where, the features, and a column per flag."""
     n = len(rows.agent_id)
     columns = {
         "unit_id": pl.Series([unit_id] * n, dtype=pl.String),

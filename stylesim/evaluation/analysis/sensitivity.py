@@ -12,7 +12,7 @@ import polars as pl
 from stylesim.corpus import Corpus
 from stylesim.errors import InputError
 from stylesim.evaluation.analysis.judge import DRIVER, JUDGED, Judge, with_tdbm
-from stylesim.evaluation.analysis.measure import _frame, per_driver
+from stylesim.evaluation.analysis.measure import frame_of, per_driver
 from stylesim.evaluation.analysis.statistics import kappa
 from stylesim.evaluation.intervals import MIN_DRIVERS
 from stylesim.kinematics import Smoother
@@ -70,7 +70,7 @@ def sensitivity(
 
 
 def _drivers(corpus: Corpus, options: FeatureOptions) -> pl.DataFrame:
-    frames = [_frame(track_rows(scene, options), scene.unit_id, scene.start_s) for scene in corpus]
+    frames = [frame_of(track_rows(scene, options), scene.unit_id, scene.start_s) for scene in corpus]
     drivers = per_driver(pl.concat(frames))
     return drivers.filter((pl.col("v_avg") > options.parked_within_m / options.window_s).fill_null(False))
 

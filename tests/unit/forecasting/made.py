@@ -104,3 +104,8 @@ def with_style_labels(corpus: Corpus, rare: str = "car-0") -> Corpus:
         ]
     )
     return corpus
+
+
+def weights(model: TrainedForecaster) -> dict[str, bytes]:
+    """The network's weights, to the bit."""
+    return {key: value.numpy().tobytes() for key, value in model.network.state_dict().items()}

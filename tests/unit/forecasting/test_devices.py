@@ -18,28 +18,14 @@ from stylesim.forecasting.devices import FabricRuntime, PlainRuntime, runtime
 from stylesim.forecasting.forecaster import TrainedForecaster
 from stylesim.forecasting.training import train
 
-from .made import SPEC, made_corpus
+from .made import SPEC, weights
 
 pytest.importorskip("lightning_fabric")
-
-
-@pytest.fixture(scope="module")
-def corpus(tmp_path_factory: pytest.TempPathFactory) -> Corpus:
-    return made_corpus(tmp_path_factory.mktemp("corpus") / "c")
-
-
-@pytest.fixture(scope="module")
-def cache(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    return tmp_path_factory.mktemp("cache")
 
 
 def trained(corpus: Corpus, cache: Path, out: Path, **options: Any) -> TrainedForecaster:
     settings = {"spec": SPEC, "max_steps": 5, "batch_size": 16, "accelerator": "cpu", "dense": True}
     return train(corpus, out=out, cache=cache, **{**settings, **options})
-
-
-def weights(model: TrainedForecaster) -> dict[str, bytes]:
-    return {key: value.numpy().tobytes() for key, value in model.network.state_dict().items()}
 
 
 @pytest.fixture(scope="module")

@@ -18,26 +18,12 @@ from stylesim.forecasting.model import ForecastNetwork
 from stylesim.forecasting.training import RECORD_FILE, train
 from tests.conftest import make_scene
 
-from .made import SPEC, made_corpus, task_of
-
-
-@pytest.fixture(scope="module")
-def corpus(tmp_path_factory: pytest.TempPathFactory) -> Corpus:
-    return made_corpus(tmp_path_factory.mktemp("corpus") / "c")
-
-
-@pytest.fixture(scope="module")
-def cache(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    return tmp_path_factory.mktemp("cache")
+from .made import SPEC, task_of, weights
 
 
 def trained(corpus: Corpus, out: Path, cache: Path, **changes: Any) -> TrainedForecaster:
     settings = {"spec": SPEC, "epochs": 2, "batch_size": 16, "seed": 3, "accelerator": "cpu"}
     return train(corpus, out=out, cache=cache, **{**settings, **changes})
-
-
-def weights(model: TrainedForecaster) -> dict[str, bytes]:
-    return {key: value.numpy().tobytes() for key, value in model.network.state_dict().items()}
 
 
 @pytest.fixture(scope="module")
