@@ -89,6 +89,8 @@ class YellowController:
             changes = list(enumerate(zip(before, now, strict=False)))
             onsets |= {(signal, link) for link, (old, new) in changes if old in "Gg" and new in "yY"}
             self._turned_green(signal, now)
+            if green := {link for link, (old, new) in changes if old == "r" and new in "Gg"}:
+                self._clearing.turned_green(signal, green)
             if red := {link for link, (old, new) in changes if old in "yY" and new == "r"}:
                 self._turned_red(signal, red, step)
                 self._clearing.turned_red(signal)

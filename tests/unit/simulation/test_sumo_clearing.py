@@ -30,5 +30,8 @@ def stranded(scenario: Scenario, folder: Path) -> int:
 def test_nobody_is_hit_who_waited_to_turn_left(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     scenario = load_scenario(str(own_network(write_net(tmp_path))))
     assert stranded(scenario, tmp_path) == 0
+    with monkeypatch.context() as nobody_waits_for_them:
+        nobody_waits_for_them.setattr(JunctionClearing, "turned_green", lambda self, signal, indices: None)
+        assert stranded(scenario, tmp_path) > 0
     monkeypatch.setattr(JunctionClearing, "turned_red", lambda self, signal: None)
     assert stranded(scenario, tmp_path) > 0
