@@ -18,6 +18,7 @@ import argparse
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import Any
 
 import torch
 
@@ -64,7 +65,7 @@ def recorded(name: str, data: Path, folder: Path) -> Corpus:
     """The recording with splits and labels of whole tracks."""
     what, out = RECORDINGS[name], folder / f"{name}-split"
     if not out.exists():
-        options = {} if what.scene_s is None else {"scene_s": what.scene_s}
+        options: dict[str, Any] = {} if what.scene_s is None else {"scene_s": what.scene_s}
         source = read(what.format, data / what.format, out=folder / name, resume=True, **options)
         if what.site:
             source = cuts_as_units(source, what.site, folder / f"{name}-cuts")

@@ -12,6 +12,7 @@ style of fewer than 30 test drivers is named and not shown. Resumable; runs of `
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Any
 
 from benchmarks import dose_response
 from benchmarks.tables import estimate_text
@@ -64,7 +65,7 @@ def show(runs: Experiment, method: str) -> None:
     print("|---" * (len(METRICS) + 5) + "|")
     small = []
     for style in ("overall", *runs.cells(method)):
-        where = {} if style == "overall" else {"by": method, "cell": style}
+        where: dict[str, Any] = {} if style == "overall" else {"by": method, "cell": style}
         for name, arm in named.items():
             means = [runs.mean(arm, metric=metric, **where) for metric in METRICS]
             size = means[0]

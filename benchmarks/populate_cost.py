@@ -75,7 +75,7 @@ def main() -> None:
         print(*run(**json.loads(given.one), seconds=given.seconds))
         return
     found: dict[str, list[float]] = {way: [] for way in WAYS}
-    steps = 0
+    steps = 0.0
     with tempfile.TemporaryDirectory() as folder:
         options = prepared(Path(folder))
         for _ in range(given.rounds):

@@ -127,8 +127,8 @@ def training(data: TrainingData, network: ForecastNetwork, *, repeats: int) -> N
                 values = (BATCH * STEPS / whole, cpu / STEPS * 1e3, (whole - work) / STEPS * 1e3, BATCH / gathered)
                 for name, value in zip(names, values, strict=True):
                     rows[name].append(value)
-    for name, values in rows.items():
-        show(name, values)
+    for name, measured in rows.items():
+        show(name, measured)
 
 
 def _timed(job: Callable[[], object]) -> float:

@@ -21,6 +21,7 @@ from collections import Counter
 from collections.abc import Iterator
 from dataclasses import asdict, fields
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -97,9 +98,9 @@ def kept(file: Path | None, key: dict[str, object]) -> tuple[Approaches, Counter
     lines = file.read_text().splitlines() if file is not None and file.exists() else []
     for item in map(json.loads, lines):
         if item["key"] == key:
-            columns = {name: np.array(values) for name, values in item["columns"].items()}
-            names = {name: tuple(item["names"][name]) for name in ("style", "unit")}
-            return Approaches(**names, **columns, counts=item["left_out"]), Counter(item["counts"])
+            columns: dict[str, Any] = {name: np.array(values) for name, values in item["columns"].items()}
+            columns |= {name: tuple(item["names"][name]) for name in ("style", "unit")}
+            return Approaches(**columns, counts=item["left_out"]), Counter(item["counts"])
     return None
 
 
