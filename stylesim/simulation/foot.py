@@ -31,6 +31,10 @@ STIFF_RAD_PER_S = 3.0
 SUDDEN = 2.0  # times the jerk of a calm foot; chosen, between it and the 2.5 with which hard stops begin
 FREE_M = 1.5  # deviation that the calm correction is left with; chosen, three sds of 0.8 m/s2 of noise
 CALM_MPS = 6.0  # below this speed the restlessness fades: who stands does not press; chosen, walking out of a queue
+STRAINED_MPS2 = 3.0  # of braking, from which on restlessness fades, gone at 4.5; chosen: a usual hard stop at a light
+ALMOST_HARD_MPS2 = (
+    4.0  # of braking, whose deviations may need more than 4.5; chosen: else 1 % of stops ended over the line
+)
 LAST_MPS2 = 0.3  # of braking, in the last moment before standing; chosen, because it is not felt
 JUMP_MPS2 = 20.0  # no vehicle does that: it was put elsewhere, and the foot begins anew
 SETTLED_STEPS = 400  # after which an answer to one draw has died away
@@ -90,11 +94,15 @@ class Foot:
         push = pace * pace * (3.0 - 2.0 * pace) * pressed
         # A stop beyond the limit builds up faster than a calm foot follows: it is told by its beginning, too.
         hard = (wished < -HARD_MPS2) | ((wished < 0.0) & (wished - last < -SUDDEN * JERK_MPS3 * dt))
-        exact = np.where(hard, 1.0, 1.0 - pace)  # who comes to a stand does so where he meant to, not over the line
+        # Who brakes hard does not play with the pedal, and who comes to a stand does so where he meant to.
+        strain = np.minimum(np.maximum((-wished - STRAINED_MPS2) / (HARD_MPS2 - STRAINED_MPS2), 0.0), 1.0)
+        exact = np.maximum(np.where(hard, 1.0, strain), 1.0 - pace)
+        push *= 1.0 - np.where(hard, 1.0, strain)
         spring = CORRECTS_RAD_PER_S + (STIFF_RAD_PER_S - CORRECTS_RAD_PER_S) * exact
         push -= 2.0 * (DAMPING + (1.0 - DAMPING) * exact) * spring * rate + spring**2 * ahead
         push -= STIFF_RAD_PER_S**2 * (ahead - np.minimum(np.maximum(ahead, -FREE_M), FREE_M))
-        lowest = np.maximum(np.where(hard, -EMERGENCY_MPS2, -HARD_MPS2), -LAST_MPS2 - np.sqrt(2.0 * JERK_MPS3 * before))
+        most = np.where(hard | (wished < -ALMOST_HARD_MPS2), -EMERGENCY_MPS2, -HARD_MPS2)
+        lowest = np.maximum(most, -LAST_MPS2 - np.sqrt(2.0 * JERK_MPS3 * before))
         change = np.where(hard, HARD_JERK_MPS3, JERK_MPS3) * dt
         driven = np.minimum(np.maximum(wished + push, lowest), HARD_MPS2)
         driven = np.minimum(np.maximum(driven, last - change), last + change)

@@ -70,6 +70,16 @@ def test_a_hard_stop_ends_where_it_was_planned() -> None:
     assert np.abs(ahead).max() < 0.2
 
 
+@pytest.mark.parametrize("braking", [3.5, 4.0, 4.4])
+def test_a_restless_foot_ends_a_firm_stop_where_it_was_planned(braking: float) -> None:
+    """20 drivers who play with the pedal until they brake; 4.4 m/s2 leave little to the limit of 4.5."""
+    wished = np.concatenate([np.zeros(80), -np.minimum(1.2 * np.arange(1, 80), braking), np.zeros(20)])
+    model = np.maximum(0.0, 18.0 + np.cumsum(wished) * DT_S)[None].repeat(20, axis=0)
+    ahead, speed = driven([0.8] * 20, model)
+    assert (speed[:, -1] < 0.01).all()
+    assert np.abs(ahead[:, -1]).max() < 0.5
+
+
 def test_it_stops_where_the_model_stops() -> None:
     """Braking with 3 m/s2 to a stand, which ends from one step to the next."""
     model = np.maximum(0.0, 15.0 - 3.0 * DT_S * np.arange(200))[None]
