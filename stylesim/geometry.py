@@ -8,7 +8,11 @@ from jaxtyping import Bool, Float, Int
 
 def wrap_angle(angle_rad: Float[np.ndarray, "*any"]) -> Float[np.ndarray, "*any"]:
     """The same angles in [-pi, pi)."""
-    return np.asarray(np.remainder(angle_rad + np.pi, 2 * np.pi) - np.pi)
+    turned = np.asarray(angle_rad + np.pi)
+    beyond = (turned < 0) | (turned >= 2 * np.pi)
+    if beyond.any():  # of the others the remainder is what they are, and it costs more than all else here
+        turned[beyond] = np.remainder(turned[beyond], 2 * np.pi)
+    return np.asarray(turned - np.pi)
 
 
 def rotated(points: Float[np.ndarray, "*any 2"], angle_rad: float) -> Float[np.ndarray, "*any 2"]:

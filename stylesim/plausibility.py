@@ -45,10 +45,9 @@ def implausible(tracks: Tracks) -> Implausible:
     with np.errstate(invalid="ignore"):
         teleport[:, 1:] = both & (np.hypot(moved[..., 0], moved[..., 1]) > MAX_SPEED_MPS)
         velocity[:] = _disagreement(tracks, teleport) > MAX_VELOCITY_ERROR_MPS
-        course = np.arctan2(tracks.velocity_mps[..., 1], tracks.velocity_mps[..., 0])
-        slip = np.abs(wrap_angle(course - tracks.heading_rad))
         fast = tracks.valid & tracks.is_motor[:, None] & (tracks.speed_mps > MOVING_MPS)
-        heading[:] = fast & (slip > MAX_SLIP_RAD)
+        vx, vy = tracks.velocity_mps[fast].T
+        heading[fast] = np.abs(wrap_angle(np.arctan2(vy, vx) - tracks.heading_rad[fast])) > MAX_SLIP_RAD
     return Implausible(teleport, velocity, heading)
 
 
@@ -58,16 +57,18 @@ def _disagreement(tracks: Tracks, teleport: Bool[np.ndarray, "agent time"]) -> F
     result = np.zeros(tracks.valid.shape)
     if tracks.n_frames <= steps:
         return result
-    sound = np.where(tracks.valid & ~teleport, 0, 1)
-    broken = np.cumsum(np.concatenate([np.zeros((tracks.n_agents, 1), int), sound], axis=1), axis=1)
-    whole = broken[:, steps + 1 :] == broken[:, : -steps - 1]
+    sound = tracks.valid & ~teleport
+    whole = sound[:, steps:].copy()
+    for earlier in range(steps):
+        whole &= sound[:, earlier : earlier - steps]
     between = (tracks.velocity_mps[:, 1:] + tracks.velocity_mps[:, :-1]).astype(np.float64) / 2
-    summed = np.cumsum(np.nan_to_num(between), axis=1)
-    meant = (
-        summed[:, steps - 1 :] - np.concatenate([np.zeros_like(summed[:, :1]), summed[:, :-steps]], axis=1)
-    ) / steps
+    between[np.isnan(between)] = 0.0
+    summed = np.zeros((tracks.n_agents, tracks.n_frames, 2))
+    np.cumsum(between, axis=1, out=summed[:, 1:])
+    meant = (summed[:, steps:] - summed[:, :-steps]) / steps
     moved = (tracks.position_m[:, steps:] - tracks.position_m[:, :-steps]).astype(np.float64) / (steps * tracks.dt_s)
-    result[:, steps:] = np.where(whole, np.hypot(*np.moveaxis(moved - meant, -1, 0)), 0.0)
+    apart = (moved - meant)[whole]
+    result[:, steps:][whole] = np.hypot(apart[:, 0], apart[:, 1])
     return result
 
 

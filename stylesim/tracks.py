@@ -26,6 +26,7 @@ class AgentKind(IntEnum):
 
 
 MOTOR_KINDS = (AgentKind.CAR, AgentKind.TRUCK, AgentKind.BUS, AgentKind.MOTORCYCLE)
+_MOTOR = np.isin(np.arange(256), [int(k) for k in MOTOR_KINDS])  # by kind
 
 
 class TrackFlag(IntFlag):
@@ -116,7 +117,7 @@ class Tracks:
     @property
     def is_motor(self) -> Bool[np.ndarray, " agent"]:
         """True for cars, trucks, buses and motorcycles."""
-        return np.isin(self.kind, [int(k) for k in MOTOR_KINDS])
+        return _MOTOR[self.kind.astype(np.uint8)]
 
     def flagged(self, flag: TrackFlag) -> Bool[np.ndarray, " agent"]:
         """True for the agents that carry `flag`."""

@@ -100,13 +100,13 @@ def refuse_other_units(tracks: Tracks, file: Path) -> None:
         length = float(np.median(tracks.size_m[cars, 0]))
         if not CAR_LENGTH_M[0] <= length <= CAR_LENGTH_M[1]:
             raise InputError(f"{file}: half of the cars are {length:.2f} m long or longer; lengths must be metres")
+    both = tracks.valid[:, 1:] & tracks.valid[:, :-1] & tracks.is_motor[:, None]
     speed = tracks.speed_mps
-    step = np.diff(tracks.position_m.astype(np.float64), axis=1) / tracks.dt_s
-    moved = np.hypot(step[..., 0], step[..., 1])
-    meant = (speed[:, 1:] + speed[:, :-1]) / 2
+    step = (np.diff(tracks.position_m.astype(np.float64), axis=1) / tracks.dt_s)[both]
+    moved = np.hypot(step[:, 0], step[:, 1])
+    meant = ((speed[:, 1:] + speed[:, :-1]) / 2)[both]
     with np.errstate(invalid="ignore"):
-        moving = tracks.is_motor[:, None] & ((meant > MOVING_MPS) | (moved > MOVING_MPS))
-        moving &= tracks.valid[:, 1:] & tracks.valid[:, :-1]
+        moving = (meant > MOVING_MPS) | (moved > MOVING_MPS)
     if moving.sum() < MIN_ROWS:
         return
     ratio = float(np.median(moved[moving] / np.maximum(meant[moving], 1e-3)))
@@ -115,8 +115,8 @@ def refuse_other_units(tracks: Tracks, file: Path) -> None:
             f"{file}: positions move {ratio:.2f} times as fast as the velocities say; "
             f"positions must be metres, {tracks.dt_s:g} s apart, and velocities m/s"
         )
-    course = np.arctan2(step[..., 1], step[..., 0])
-    error = float(np.median(np.abs(wrap_angle(course - tracks.heading_rad[:, 1:]))[moving]))
+    course = np.arctan2(step[moving, 1], step[moving, 0])
+    error = float(np.median(np.abs(wrap_angle(course - tracks.heading_rad[:, 1:][both][moving]))))
     if error > MAX_HEADING_ERROR_RAD:
         raise InputError(
             f"{file}: headings are {np.degrees(error):.0f} degrees off the direction of motion; "

@@ -18,11 +18,12 @@ NOMINAL_SIZE_M = {
     AgentKind.STATIC: (1.0, 1.0),
     AgentKind.OTHER: (1.0, 1.0),
 }
+_BY_NUMBER = np.array([NOMINAL_SIZE_M[kind] for kind in sorted(NOMINAL_SIZE_M)], np.float64)
 
 
 def nominal_sizes(kind: Int[np.ndarray, " agent"]) -> Float64[np.ndarray, "agent 2"]:
     """Length and width of each agent by its kind."""
-    return np.array([NOMINAL_SIZE_M[AgentKind(k)] for k in kind.tolist()], np.float64).reshape(-1, 2)
+    return _BY_NUMBER[kind]
 
 
 def completed(
