@@ -90,8 +90,18 @@ def _folders(root: Path) -> Iterator[Path]:
             yield folder
 
 
+def _named(folder: Path, begin: str, end: str) -> list[Path]:
+    """The files of a folder by name; a pattern of `glob` costs ten times as much, thrice for each of a million."""
+    try:
+        with os.scandir(folder) as entries:
+            names = sorted(e.name for e in entries if e.name.startswith(begin) and e.name.endswith(end))
+    except OSError as error:
+        raise InputError(f"cannot read {folder}: {error.strerror or error}") from error
+    return [folder / name for name in names]
+
+
 def _parquet(folder: Path) -> Path | None:
-    files = sorted(folder.glob("scenario_*.parquet"))
+    files = _named(folder, "scenario_", ".parquet")
     if len(files) > 1:
         raise InputError(f"{folder} holds {len(files)} scenario_*.parquet; a scenario's folder has one")
     return files[0] if files else None
@@ -104,7 +114,7 @@ def _scene(folder: Path, split: str) -> Scene:
     first = table.numbers[table.frame == table.frame.min(), :2]
     origin = np.round(np.median(first, axis=0))  # of the first frame only: what comes later moves nothing
     observed = int(table.frame.max()) + 1
-    maps = sorted(folder.glob("log_map_archive_*.json"))
+    maps = _named(folder, "log_map_archive_", ".json")
     if not maps:
         raise InputError(f"{folder} has no log_map_archive_*.json beside {file.name}; the copy is incomplete")
     tracks = flagged_implausible(_tracks(table, origin, T0_FRAME + 1 if observed <= T0_FRAME + 1 else N_FRAMES))

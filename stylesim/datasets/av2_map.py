@@ -2,23 +2,23 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
+from operator import attrgetter
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 from jaxtyping import Float32, Float64, Int64
 
+from stylesim.datasets.av2_map_file import LaneSegment, Point, map_file
 from stylesim.datasets.guarding import reading
-from stylesim.datasets.json_files import json_document
 from stylesim.datasets.polylines import MAX_MAP_M
 from stylesim.road import Lane, Road
 
 # Lanes for motor traffic [read: the lane types of the format are VEHICLE, BUS, BIKE]. A bicycle lane would be
 # the nearest "lane" of many a car beside it.
 DRIVABLE = ("VEHICLE", "BUS")
-MAX_FILE_BYTES = 1 << 28  # chosen: maps have 0.1 to 10 MB
+_X, _Y = attrgetter("x"), attrgetter("y")
 BOUNDARY_POINTS = 20  # chosen: lane segments are 10 to 60 m long, so the centre has a point every 0.5 to 3 m
 
 
@@ -29,25 +29,25 @@ def read_map(path: Path, origin_m: Float64[np.ndarray, " 2"]) -> Road:
     neighbours outside the map are left out. InputError where the file is damaged or no such map.
     """
     with reading(path, "Argoverse 2 map"):
-        document = json_document(path, limit_bytes=MAX_FILE_BYTES)
-        segments = [s for s in document["lane_segments"].values() if s["lane_type"] in DRIVABLE]
-        crossings = list(document.get("pedestrian_crossings", {}).values())
-        sides = [s[f"{side}_lane_boundary"] for s in segments for side in ("left", "right")]
-        edges = [crossing[edge] for crossing in crossings for edge in ("edge1", "edge2")]
-        given = [s["centerline"] for s in segments if s.get("centerline")]
+        content = map_file(path)
+        segments = [s for s in content.lane_segments.values() if s.lane_type in DRIVABLE]
+        crossings = list(content.pedestrian_crossings.values())
+        sides = [side for s in segments for side in (s.left_lane_boundary, s.right_lane_boundary)]
+        edges = [edge for crossing in crossings for edge in (crossing.edge1, crossing.edge2)]
+        given = [s.centerline for s in segments if s.centerline]
         lines = _Lines.of([*sides, *edges, *given], origin_m)
         even = lines.even(len(sides)).reshape(-1, 2, BOUNDARY_POINTS, 2)
         middle = even.mean(axis=1).astype(np.float32)
         middle.flags.writeable = False
         width = np.median(np.hypot(*np.moveaxis(even[:, 0] - even[:, 1], -1, 0)), axis=-1)
         centre = iter(range(len(sides) + len(edges), len(lines.start)))
-        known = {str(s["id"]) for s in segments}
+        known = {str(s.id) for s in segments}
         lanes = tuple(
             _lane(
                 segment,
                 known,
                 (lines.line(2 * i), lines.line(2 * i + 1)),
-                lines.line(next(centre)) if segment.get("centerline") else middle[i],
+                lines.line(next(centre)) if segment.centerline else middle[i],
                 float(width[i]),
             )
             for i, segment in enumerate(segments)
@@ -69,10 +69,14 @@ class _Lines:
     start: Int64[np.ndarray, " line"]  # of each line, and the end of the last
 
     @classmethod
-    def of(cls, lines: Sequence[Sequence[Mapping[str, float]]], origin_m: Float64[np.ndarray, " 2"]) -> _Lines:
+    def of(cls, lines: Sequence[Sequence[Point]], origin_m: Float64[np.ndarray, " 2"]) -> _Lines:
         """Lines in metres from `origin_m`; repeated points are left out. ValueError as `polylines.map_line`."""
         owner = np.repeat(np.arange(len(lines)), [len(line) for line in lines])
-        points = np.array([(p["x"], p["y"]) for line in lines for p in line], np.float64).reshape(-1, 2) - origin_m
+        every = [point for line in lines for point in line]
+        points = np.empty((len(every), 2))
+        for axis, of in enumerate((_X, _Y)):
+            points[:, axis] = np.fromiter(map(of, every), np.float64, len(every))
+        points -= origin_m
         if not (np.abs(points) <= MAX_MAP_M).all():  # not-a-number fails too
             raise ValueError("a point of the map is not finite or too far away")
         apart = np.ones(len(points), bool)
@@ -101,24 +105,24 @@ class _Lines:
 
 
 def _lane(
-    segment: Mapping[str, Any],
+    segment: LaneSegment,
     known: set[str],
     sides_m: tuple[Float32[np.ndarray, "l 2"], Float32[np.ndarray, "r 2"]],
     centre_m: Float32[np.ndarray, "point 2"],
     width_m: float,
 ) -> Lane:
     return Lane(
-        lane_id=str(segment["id"]),
+        lane_id=str(segment.id),
         centre_line_m=centre_m,
         width_m=width_m,
         left_boundary_m=sides_m[0],
         right_boundary_m=sides_m[1],
-        successors=tuple(str(i) for i in segment["successors"] if str(i) in known),
-        left_neighbour=_neighbour(segment["left_neighbor_id"], known),
-        right_neighbour=_neighbour(segment["right_neighbor_id"], known),
-        in_junction=bool(segment["is_intersection"]),
+        successors=tuple(lane for lane in map(str, segment.successors) if lane in known),
+        left_neighbour=_neighbour(segment.left_neighbor_id, known),
+        right_neighbour=_neighbour(segment.right_neighbor_id, known),
+        in_junction=segment.is_intersection,
     )
 
 
-def _neighbour(lane_id: Any, known: set[str]) -> str:
+def _neighbour(lane_id: int | str | None, known: set[str]) -> str:
     return str(lane_id) if lane_id is not None and str(lane_id) in known else ""

@@ -50,8 +50,7 @@ def table_of(file: Path) -> AvTable:
     """
     table = _read(file)
     single = [_once(table, name, file) for name in _SINGLE]
-    columns = [table[name].to_numpy() for name in _NUMBERS]
-    numbers = np.stack([np.asarray(column, np.float64) for column in columns], -1)
+    numbers = np.stack([np.asarray(table[name].to_numpy(), np.float64) for name in _NUMBERS], -1)
     steps = table["timestep"]
     frame = (steps.fill_null(-1) if steps.null_count() else steps).to_numpy().astype(np.int64)
     readable = np.isfinite(numbers).all(axis=1)
@@ -61,23 +60,20 @@ def table_of(file: Path) -> AvTable:
     kept: Bool[np.ndarray, " row"] = readable & _plausible(numbers, frame, np.asarray(readable))
     if not kept.any():
         raise InputError(f"{file} has no usable row")
-    codes = table["track_id"].cast(pl.Categorical).to_physical().to_numpy()
     rows = np.flatnonzero(kept)
-    _, first, code = np.unique(codes[rows], return_index=True, return_inverse=True)
-    names = np.array([str(name) for name in table["track_id"].gather(rows[first]).to_list()])
-    rank = np.argsort(np.argsort(names))  # agents in the order of their ids
-    agent = rank[code]
+    names, agent = _agents(table["track_id"], rows)
     key = agent * N_FRAMES + frame[rows]
-    _, once = np.unique(key, return_index=True)
-    rows, agent = rows[once], agent[once]
+    if not (np.diff(key) > 0).all():
+        _, once = np.unique(key, return_index=True)
+        rows, agent = rows[once], agent[once]
     begins = np.searchsorted(agent, np.arange(len(names)))
     return AvTable(
         scenario_id=single[0],
         city=single[1],
         focal_track_id=single[2],
-        agent_id=tuple(np.sort(names).tolist()),
-        object_type=tuple(str(kind) for kind in table["object_type"].gather(rows[begins]).to_list()),
-        agent=agent.astype(np.int64),
+        agent_id=tuple(names),
+        object_type=tuple(str(kind) for kind in table["object_type"][rows[begins].tolist()]),
+        agent=agent,
         frame=frame[rows],
         numbers=numbers[rows],
         rows_in=table.height,
@@ -89,10 +85,25 @@ def table_of(file: Path) -> AvTable:
     )
 
 
+def _agents(track_id: pl.Series, rows: Int64[np.ndarray, " row"]) -> tuple[list[str], Int64[np.ndarray, " row"]]:
+    """The ids of the tracks in those rows, in their order as text, and to which of them each row belongs."""
+    starts = np.ones(len(track_id), bool)  # rows of one track stand together: a name is looked at once
+    changes = track_id.slice(1) != track_id.slice(0, len(track_id) - 1)
+    starts[1:] = (changes.fill_null(True) if changes.null_count() else changes).to_numpy()
+    run = (np.cumsum(starts) - 1)[rows]
+    runs = np.unique(run)
+    found = [str(name) for name in track_id[np.flatnonzero(starts)[runs].tolist()]]
+    names = sorted(set(found))
+    number = {name: i for i, name in enumerate(names)}
+    code = np.zeros(int(run.max()) + 1, np.int64)
+    code[runs] = [number[name] for name in found]
+    return names, code[run]
+
+
 def _plausible(
     numbers: Float64[np.ndarray, "row 5"], frame: Int64[np.ndarray, " row"], readable: Bool[np.ndarray, " row"]
 ) -> Bool[np.ndarray, " row"]:
-    middle = np.median(numbers[readable, :2], axis=0) if readable.any() else np.zeros(2)
+    middle = [np.median(numbers[readable, axis]) for axis in (0, 1)] if readable.any() else np.zeros(2)
     with np.errstate(invalid="ignore", over="ignore"):
         slow = np.hypot(numbers[:, 3], numbers[:, 4]) <= MAX_SPEED_MPS
         near = (np.abs(numbers[:, :2] - middle) <= MAX_DISTANCE_M).all(axis=1)
@@ -114,15 +125,16 @@ def _read(file: Path) -> pl.DataFrame:
     """The columns that are needed, in their types. One thread: a file is small, and starting others costs more."""
     try:
         raw = file.read_bytes()
-        schema = pl.read_parquet_schema(raw)
-        absent = [name for name in _COLUMNS if name not in schema]
-        if absent:
-            raise InputError(f"{file} lacks the columns {', '.join(absent)}; it is no scenario of Argoverse 2")
-        table = pl.read_parquet(raw, columns=list(_COLUMNS), parallel="none", use_statistics=False)
+        try:
+            table = pl.read_parquet(raw, columns=list(_COLUMNS), parallel="none", use_statistics=False)
+        except pl.exceptions.ColumnNotFoundError:
+            schema = pl.read_parquet_schema(raw)
+            absent = ", ".join(name for name in _COLUMNS if name not in schema)
+            raise InputError(f"{file} lacks the columns {absent}; it is no scenario of Argoverse 2") from None
     except (OSError, pl.exceptions.PolarsError, pl.exceptions.PanicException) as error:
         reason = (str(error).splitlines() or ["unreadable"])[0]
         raise InputError(f"{file} is damaged or no Parquet file ({reason}); get it again") from error
-    if all(table.schema[name] == dtype for name, dtype in _COLUMNS.items()):
+    if dict(table.schema) == _COLUMNS:
         return table
     try:
         return table.select(pl.col(name).cast(dtype) for name, dtype in _COLUMNS.items())
