@@ -1,6 +1,6 @@
 """What synthetic drivers of rare styles buy on a real recording: 0, 10, 30 and 100 % of every batch.
 
-    python -m benchmarks.dose_response --folder runs/dose [--recording dlr_ut] [--size mini] [--steps 600] [--seeds 5]
+    python -m benchmarks.dose_response [--recording dlr_ut] [--size mini] [--steps 600] [--seeds 5] [--out runs/dose]
 
 All arms take equally many gradient steps. Controls: the same amount of everyday traffic (population `naturalistic`,
 same scenarios and seeds), and no synthetic data but the recording's rare styles drawn more often (`balanced`). 100 %
@@ -14,7 +14,6 @@ three are one site, so that nothing here speaks of other sites. Labellers are fi
 
 from __future__ import annotations
 
-import argparse
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -23,10 +22,11 @@ from typing import Any
 import torch
 
 from benchmarks.arms_table import print_table
-from benchmarks.worlds import seeds_of, told
+from benchmarks.worlds import arm_options, arms_of, folder_of, seeds_of, spec_of, told
 from stylesim.corpus import Corpus, CorpusWriter
 from stylesim.datasets.reading import read
 from stylesim.experiments.arms import Arm
+from stylesim.experiments.results import Experiment
 from stylesim.experiments.running import run_experiment
 from stylesim.forecasting.robust import RobustSettings
 from stylesim.labelers.labelling import label
@@ -109,37 +109,34 @@ def arms(rare: Corpus, usual: Corpus, by: str) -> list[Arm]:
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--folder", type=Path, required=True)
+    parser = arm_options(__doc__, seeds=5, steps=600)
     parser.add_argument("--recording", choices=sorted(RECORDINGS), default="dlr_ut")
     parser.add_argument("--data", type=Path, default=Path("../shared/data"))
-    parser.add_argument("--size", default="mini")
-    parser.add_argument("--steps", type=int, default=600)
-    parser.add_argument("--seeds", type=int, default=5)
-    parser.add_argument("--first-seed", type=int, default=0, help="so that two processes can share the seeds")
     parser.add_argument("--episodes", type=int, default=6, help="of each scenario and population")
-    parser.add_argument("--only", default="", help="names of arms, comma-separated")
     asked = parser.parse_args()
     torch.set_num_threads(1)
     name, what = asked.recording, RECORDINGS[asked.recording]
-    corpus = recorded(name, asked.data, asked.folder)
-    plain = all(not info.road for info in corpus.info)
-    rare, usual = (
-        synthetic(what.scenarios, crowd, asked.folder / f"{name}-{crowd}", episodes=asked.episodes, plain=plain)
-        for crowd in ("rare_heavy", "naturalistic")
-    )
-    chosen = [arm for arm in arms(rare, usual, what.by) if not asked.only or arm.name in asked.only.split(",")]
-    result = run_experiment(
-        chosen,
-        corpus=corpus,
-        seeds=seeds_of(asked),
-        steps=asked.steps,
-        size=asked.size,
-        spec=SPEC,
-        out=asked.folder / f"{name}-{asked.size}-{asked.steps}",
-        cache=asked.folder / "cache",
-        progress=told,
-    )
+    corpus = recorded(name, asked.data, asked.out)
+    out = folder_of(asked, name)
+    if asked.show:
+        result = Experiment.load(out)
+    else:
+        plain = all(not info.road for info in corpus.info)
+        rare, usual = (
+            synthetic(what.scenarios, crowd, asked.out / f"{name}-{crowd}", episodes=asked.episodes, plain=plain)
+            for crowd in ("rare_heavy", "naturalistic")
+        )
+        result = run_experiment(
+            arms_of(asked, arms(rare, usual, what.by)),
+            corpus=corpus,
+            seeds=seeds_of(asked),
+            steps=asked.steps,
+            size=asked.size,
+            spec=spec_of(asked, SPEC),
+            out=out,
+            cache=asked.out / "cache",
+            progress=told,
+        )
     units = {info.unit_id.split("/")[0] for info in corpus.info}
     print(f"{name}, {asked.size}, {asked.steps} steps; site(s): {', '.join(sorted(units))}")
     print_table(result, BASE, what.by, least_on_val=LEAST_ON_VAL, sites=len(units))

@@ -1,6 +1,6 @@
 """The paper's table: no style, or style by early, mid or late fusion, by the style of the whole track.
 
-    python -m benchmarks.paper_table [--corpus simulated] [--seeds 5] [--steps 400] [--size mini] [--out FOLDER]
+    python -m benchmarks.paper_table [--corpus simulated] [--seeds 5] [--steps 600] [--history 1] [--lr 0.003]
 
 brierFDE / minADE / minFDE in metres, miss rate as a share; mean over drivers and seeds with its 95 % interval. The
 paper's numbers (nuScenes, MTR, 6 s) stand beside; they are of another data set, another model and, for a style, of
@@ -16,14 +16,13 @@ from typing import Any
 
 from benchmarks import dose_response
 from benchmarks.tables import estimate_text
-from benchmarks.worlds import SPEC, options, seeds_of, simulated, told
+from benchmarks.worlds import SPEC, arm_options, arms_of, folder_of, seeds_of, simulated, spec_of, told
 from stylesim.corpus import Corpus
 from stylesim.experiments.arms import Arm
 from stylesim.experiments.results import Experiment
 from stylesim.experiments.running import run_experiment
 from stylesim.labelers.labelling import label
 from stylesim.labelers.reference import new_labeler
-from stylesim.windows import WindowSpec
 
 METRICS = {"brier_fde_m": "brierFDE", "min_ade_m": "minADE", "min_fde_m": "minFDE", "miss_rate": "miss rate"}
 PAPER = {  # REFERENCE section 4 [paper]; it has no mid fusion
@@ -86,28 +85,26 @@ def show(runs: Experiment, method: str) -> None:
 
 
 def main() -> None:
-    parser = options(__doc__, seeds=5, steps=400, size="mini")
+    parser = arm_options(__doc__, seeds=5, steps=400)
     parser.add_argument("--corpus", choices=("simulated", *dose_response.RECORDINGS), default="simulated")
     parser.add_argument("--data", type=Path, default=Path("../shared/data"))
     asked = parser.parse_args()
     simulation = asked.corpus == "simulated"
     method = "kdsc" if asked.corpus == "dlr_ht" else "tdbm"  # TDBM needs lanes
-    name = "styles" if simulation else f"paper-{asked.corpus}"
-    out = asked.out / f"{name}-{asked.size}-{asked.steps}"
-    spec: WindowSpec = SPEC if simulation else dose_response.SPEC
+    out = folder_of(asked, "styles" if simulation else f"paper-{asked.corpus}")
     if not asked.show:
         if simulation:
             corpus = simulated(asked.out, "tdbm_spectrum")
         else:
             corpus = recorded(asked.corpus, asked.data, asked.out, method)
         run_experiment(
-            list(arms(method).values()),
+            arms_of(asked, list(arms(method).values())),
             corpus=corpus,
             seeds=seeds_of(asked),
             steps=asked.steps,
             out=out,
             size=asked.size,
-            spec=spec,
+            spec=spec_of(asked, SPEC if simulation else dose_response.SPEC),
             progress=told,
         )
     show(Experiment.load(out), method)

@@ -11,10 +11,8 @@ below 0 is a gain. Resumable: repeat the command; a second process may take othe
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 from benchmarks.tables import estimate_text
-from benchmarks.worlds import SPEC, options, seeds_of, simulated, told
+from benchmarks.worlds import folder_of, options, seeds_of, simulated, spec_of, told
 from stylesim.experiments.placebo import CONTROL_WORLD, PLACEBO_WORLD, Placebo, placebo, placebo_of
 from stylesim.experiments.results import Experiment
 
@@ -31,14 +29,8 @@ def show(found: Placebo) -> None:
 
 
 def main() -> None:
-    parser = options(__doc__, seeds=10, steps=400, size="mini")
-    parser.add_argument("--history", type=float, default=SPEC.history_s, help="seconds; the shorter, the less it tells")
-    parser.add_argument("--lr", type=float, help="peak learning rate of all arms; that of train without it")
-    asked = parser.parse_args()
-    spec = replace(SPEC, history_s=asked.history)
-    shorter = "" if spec == SPEC else f"-history{asked.history:g}"
-    faster = "" if asked.lr is None else f"-lr{asked.lr:g}"
-    out = asked.out / f"placebo-{asked.size}-{asked.steps}{shorter}{faster}"
+    asked = options(__doc__, seeds=10, steps=400).parse_args()
+    out = folder_of(asked, "placebo")
     if asked.show:
         found = placebo_of(out, condition=CONDITION)
     else:
@@ -50,7 +42,7 @@ def main() -> None:
             out=out,
             condition=CONDITION,
             size=asked.size,
-            spec=spec,
+            spec=spec_of(asked),
             lr=asked.lr,
             progress=told,
         )

@@ -1,6 +1,6 @@
 """What helps drivers of rare styles: every option of `train` for them, compared over several seeds.
 
-    python -m benchmarks.rare_styles --folder runs/rare_styles [--size mini] [--steps 1000] [--seeds 5]
+    python -m benchmarks.rare_styles [--size mini] [--steps 1000] [--seeds 5] [--out runs/rare_styles]
 
 Trained on simulated everyday traffic (population `naturalistic`, where four of six styles are below 11 %), judged on
 episodes in which all six are equally frequent, so that each has enough drivers. `+augment` takes 30 % of every batch
@@ -17,9 +17,10 @@ from pathlib import Path
 import torch
 
 from benchmarks.arms_table import print_table
-from benchmarks.worlds import seeds_of, told
+from benchmarks.worlds import arm_options, arms_of, folder_of, seeds_of, spec_of, told
 from stylesim.corpus import Corpus
 from stylesim.experiments.arms import Arm
+from stylesim.experiments.results import Experiment
 from stylesim.experiments.running import run_experiment
 from stylesim.labelers.labelling import label
 from stylesim.labelers.reference import default_labeler
@@ -64,34 +65,33 @@ def arms(added: Corpus) -> list[Arm]:
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--folder", type=Path, required=True)
-    parser.add_argument("--size", default="mini")
-    parser.add_argument("--steps", type=int, default=1000)
-    parser.add_argument("--seeds", type=int, default=5)
-    parser.add_argument("--first-seed", type=int, default=0, help="so that two processes can share the seeds")
+    parser = arm_options(__doc__, seeds=5, steps=1000)
     parser.add_argument("--episodes", type=int, default=8, help="of each scenario, for training")
-    parser.add_argument("--only", default="", help="names of arms, comma-separated")
     asked = parser.parse_args()
     torch.set_num_threads(1)
-    train = divided(made(asked.folder, "everyday", "naturalistic", episodes=asked.episodes, seed=1), (0.85, 0.15, 0.0))
-    judged = divided(made(asked.folder, "judged", "tdbm_spectrum", episodes=5, seed=2), (0.1, 0.3, 0.6))
-    added = made(asked.folder, "rare", "rare_heavy", episodes=asked.episodes, seed=3)
-    chosen = [arm for arm in arms(added) if not asked.only or arm.name in asked.only.split(",")]
-    result = run_experiment(
-        chosen,
+    out = folder_of(asked, "rare_styles")
+    result = Experiment.load(out) if asked.show else run(asked, out)
+    for by in ("commanded", "tdbm"):
+        print_table(result, BASE, by)
+
+
+def run(asked: argparse.Namespace, out: Path) -> Experiment:
+    """Make the corpora and train what is missing."""
+    train = divided(made(asked.out, "everyday", "naturalistic", episodes=asked.episodes, seed=1), (0.85, 0.15, 0.0))
+    judged = divided(made(asked.out, "judged", "tdbm_spectrum", episodes=5, seed=2), (0.1, 0.3, 0.6))
+    added = made(asked.out, "rare", "rare_heavy", episodes=asked.episodes, seed=3)
+    return run_experiment(
+        arms_of(asked, arms(added)),
         corpus=train,
         test=judged,
         seeds=seeds_of(asked),
         steps=asked.steps,
         size=asked.size,
-        spec=SPEC,
-        out=asked.folder / f"{asked.size}-{asked.steps}",
-        cache=asked.folder / "cache",
+        spec=spec_of(asked, SPEC),
+        out=out,
+        cache=asked.out / "cache",
         progress=told,
     )
-    for by in ("commanded", "tdbm"):
-        print_table(result, BASE, by)
 
 
 if __name__ == "__main__":

@@ -1,22 +1,24 @@
 """Does it help a forecaster to be told the style that the history shows? On whom, and compared to what?
 
-    python -m benchmarks.style_helps [--seeds 5] [--steps 400] [--size mini] [--out runs/experiments]
+    python -m benchmarks.style_helps [--seeds 5] [--steps 600] [--history 1] [--lr 0.003] [--out runs/experiments]
 
 Simulated traffic of all six styles. Told: the TDBM class of the history, or of the history and earlier windows of the
-same driver. Against: nothing; the raw features of TDBM and KDSC in place of the class; a class by lot; and, for the
-earlier windows, their raw features. All have the same number of parameters, start weights, order of samples and steps.
+same driver (20 s of them, which count most where the history is short). Against: nothing; the raw features of TDBM and
+KDSC in place of the class; a class by lot; and, for the earlier windows, their raw features. All have the same number
+of parameters, start weights, order of samples and steps.
 
 The baseline that counts is the one with the least minFDE on validation, and the style that is followed is the one in
-which the model that is told nothing is worst on validation; both are chosen once, the claims are read from test. "No
-worse" is shown where the 95 % interval of the change lies below the margin of the placebo test; an interval that
-includes 0 does not show it.
+which the model that is told nothing is worst on validation; both are chosen once, the claims are read from test. The
+oracle, told the commanded style, shows what there is to gain at this length of training; no claim is made of it, for it
+sees the future. "No worse" is shown where the 95 % interval of the change lies below the margin of the placebo test;
+an interval that includes 0 does not show it.
 Resumable: repeat the command; a second process may take other seeds (`--first-seed`).
 """
 
 from __future__ import annotations
 
 from benchmarks.tables import estimate_text
-from benchmarks.worlds import SPEC, options, seeds_of, simulated, told
+from benchmarks.worlds import arm_options, arms_of, folder_of, seeds_of, simulated, spec_of, told
 from stylesim.experiments.arms import Arm
 from stylesim.experiments.placebo import MARGIN
 from stylesim.experiments.results import Experiment
@@ -24,7 +26,7 @@ from stylesim.experiments.running import run_experiment
 
 BY = "commanded"
 TOLD = {"tdbm": ("none", "features", "random"), "earlier": ("none", "features", "random", "earlier_features")}
-ARMS = ("none", "tdbm", "features", "random", "earlier", "earlier_features")
+ARMS = ("none", "tdbm", "features", "random", "earlier", "earlier_features", "oracle")
 
 
 def arms() -> list[Arm]:
@@ -68,17 +70,17 @@ def _one(values: list[int]) -> str:
 
 
 def main() -> None:
-    asked = options(__doc__, seeds=5, steps=400, size="mini").parse_args()
-    out = asked.out / f"styles-{asked.size}-{asked.steps}"
+    asked = arm_options(__doc__, seeds=5, steps=400).parse_args()
+    out = folder_of(asked, "styles")
     if not asked.show:
         run_experiment(
-            arms(),
+            arms_of(asked, arms()),
             corpus=simulated(asked.out, "tdbm_spectrum"),
             seeds=seeds_of(asked),
             steps=asked.steps,
             out=out,
             size=asked.size,
-            spec=SPEC,
+            spec=spec_of(asked),
             progress=told,
         )
     show(Experiment.load(out))

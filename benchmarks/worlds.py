@@ -4,9 +4,13 @@ from __future__ import annotations
 
 import argparse
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 from stylesim.corpus import Corpus
+from stylesim.errors import unknown
+from stylesim.experiments.arms import Arm
 from stylesim.labelers.labelling import label
 from stylesim.labelers.reference import default_labeler
 from stylesim.merging.merge import merge
@@ -43,16 +47,47 @@ def simulated(
     return labelled(Corpus(merged))
 
 
-def options(description: str | None, *, seeds: int, steps: int, size: str = "tiny") -> argparse.ArgumentParser:
-    """The command line that these benchmarks share."""
+def options(description: str | None, *, seeds: int, steps: int, size: str = "mini") -> argparse.ArgumentParser:
+    """The command line that the benchmarks of trainings share."""
     parser = argparse.ArgumentParser(description=description, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--out", type=Path, default=ROOT, help="corpora, models and results; a rerun goes on there")
     parser.add_argument("--seeds", type=int, default=seeds, help="training seeds, from 0")
     parser.add_argument("--first-seed", type=int, default=0, help="for a second process with other seeds")
     parser.add_argument("--steps", type=int, default=steps, help="batches of each training")
     parser.add_argument("--size", default=size, help="of the network: mini or tiny")
+    parser.add_argument("--history", type=float, help="seconds; the shorter, the less the motion itself tells of style")
+    parser.add_argument("--lr", type=float, help="peak learning rate of all arms; that of train without it")
     parser.add_argument("--show", action="store_true", help="print what is there; train nothing")
     return parser
+
+
+def arm_options(description: str | None, *, seeds: int, steps: int) -> argparse.ArgumentParser:
+    """The same where the command line also chooses arms (`arms_of`)."""
+    parser = options(description, seeds=seeds, steps=steps)
+    parser.add_argument("--only", default="", help="names of arms, comma-separated; all without it")
+    return parser
+
+
+def spec_of(asked: argparse.Namespace, usual: WindowSpec = SPEC) -> WindowSpec:
+    """The windows of a benchmark, with the history that the command line asks for."""
+    return usual if asked.history is None else replace(usual, history_s=asked.history)
+
+
+def arms_of(asked: argparse.Namespace, arms: Sequence[Arm]) -> list[Arm]:
+    """The arms that the command line asks for, with its learning rate."""
+    common: dict[str, Any] = {} if asked.lr is None else {"lr": asked.lr}
+    only = [name for name in asked.only.split(",") if name]
+    for name in only:
+        if name not in {arm.name for arm in arms}:
+            raise unknown("arm", name, [arm.name for arm in arms])
+    return [replace(arm, options={**arm.options, **common}) for arm in arms if not only or arm.name in only]
+
+
+def folder_of(asked: argparse.Namespace, name: str) -> Path:
+    """Where the runs lie that were made as the command line asks; what runs have in common is in its name."""
+    shorter = "" if asked.history is None else f"-history{asked.history:g}"
+    faster = "" if asked.lr is None else f"-lr{asked.lr:g}"
+    return Path(asked.out) / f"{name}-{asked.size}-{asked.steps}{shorter}{faster}"
 
 
 def told(name: str, done: int, total: int) -> None:
