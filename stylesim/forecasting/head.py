@@ -75,13 +75,18 @@ class Head(nn.Module):
         odds: Tensor = self.odds(query)
         return odds.squeeze(-1)
 
+    def hidden(self, query: Float[Tensor, "batch query width"]) -> Float[Tensor, "batch query hidden"]:
+        """What the paths are read from (`mean`)."""
+        found: Tensor = self.path[1](self.path[0](query))
+        return found
+
     def mean(
-        self, query: Float[Tensor, "batch query width"], anchor: Float[Tensor, "batch query time 2"]
+        self, hidden: Float[Tensor, "batch query hidden"], anchor: Float[Tensor, "batch query time 2"]
     ) -> Float[Tensor, "batch query time 2"]:
         """The paths alone; with an anchor that has only the last step, the ends alone. For prediction."""
         start = self.steps - anchor.shape[2]
         last = cast(nn.Linear, self.path[2])
         weight = last.weight.view(self.steps, 4, -1)[start:, :2]  # [time 2 hidden]
         bias = last.bias.view(self.steps, 4)[start:, :2]  # [time 2]
-        out = functional.linear(self.path[1](self.path[0](query)), weight.flatten(0, 1), bias.flatten())
+        out = functional.linear(hidden, weight.flatten(0, 1), bias.flatten())
         return anchor + self.reach[start:] * out.view(*anchor.shape)

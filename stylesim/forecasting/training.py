@@ -103,11 +103,10 @@ def train(
         return load(out)
     folder = opened(out, record, resume=resume)
     watch = _Watch(stage, progress)
+    kept = cache or cache_dir()
     conditioner, data, groups = _training_set(
-        corpus, added, condition, spec, inputs, judges, robust, seed=seed, cache=cache or cache_dir(), watch=watch
+        corpus, added, condition, spec, inputs, judges, robust, dense=dense, seed=seed, cache=kept, watch=watch
     )
-    if dense:
-        data = data.with_parts([replace(part, dense=True) for part in data.parts])
     config = with_styles(config, conditioner)
     place = runtime(accelerator, precision, compiled=compiled)
     if "jtt" in robust.methods:
@@ -134,6 +133,7 @@ def _training_set(
     judges: Judges | None,
     robust: RobustSettings,
     *,
+    dense: bool,
     seed: int,
     cache: Path,
     watch: _Watch,
@@ -142,6 +142,7 @@ def _training_set(
     corpora = [corpus] if added is None else [corpus, added.corpus]
     stores = [compiled(c, spec, inputs, cache, progress=watch.begin("compiling samples")) for c in corpora]
     conditioner, parts = styled_data(corpora, condition, spec, stores, inputs, judges, seed=seed, begin=watch.begin)
+    parts = [replace(part, dense=dense) for part in parts]
     data: TrainingSet = parts[0] if added is None else MixedData(parts[0], parts[1], added.share)
     if not robust.grouped:
         return conditioner, data, ()
