@@ -128,6 +128,14 @@ def is_told(forecaster: object) -> bool:
     return isinstance(forecaster, Conditioned) and bool(forecaster.styles)
 
 
+def is_untold(forecaster: object) -> bool:
+    """True for a forecaster that says (`styles` is empty) that it is one that could be told, but is told nothing.
+
+    It is what a gain from styles is measured against: a baseline without learning has no `styles` at all.
+    """
+    return getattr(forecaster, "styles", None) == ()
+
+
 def horizon_s(forecaster: Forecaster) -> float:
     """How far the forecaster can look, in seconds; infinity where it does not say."""
     return float(getattr(forecaster, "horizon_s", math.inf))

@@ -97,10 +97,13 @@ def permuted(
     return PermutedStyles(forecaster, {key: told[i] for key, i in zip(keys, source, strict=True)})
 
 
-def with_placebo_row(evaluation: Evaluation, placebo: Evaluation) -> Evaluation:
-    """The evaluation of a told forecaster that carries the errors of its placebo, over all moving drivers, with it."""
+def with_placebo_row(evaluation: Evaluation, placebo: Evaluation, *, against: Sequence[str] = ()) -> Evaluation:
+    """The evaluation of a told forecaster that carries the errors of its placebo, over all moving drivers, with it.
+
+    `against` names the forecasters beside it that are told nothing (`forecast.is_untold`).
+    """
     metrics = {name: value.to_dict() for name, value in placebo.overall.metrics.items()}
-    row = {"within": "scenario and context", "all": metrics}
+    row = {"within": "scenario and context", "against": list(against), "all": metrics}
     return replace(evaluation, about={**evaluation.about, PLACEBO_ROW: row})
 
 

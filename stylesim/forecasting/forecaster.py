@@ -14,7 +14,7 @@ from stylesim.forecasting.batching import gather, to_scene
 from stylesim.forecasting.conditioner import StyleCond, StyleConditioner
 from stylesim.forecasting.conditioning import NULL
 from stylesim.forecasting.config import ModelConfig
-from stylesim.forecasting.marginal import MARGINAL, averaged
+from stylesim.forecasting.marginal import MARGINAL, NO_STYLE, averaged
 from stylesim.forecasting.model import ForecastNetwork
 from stylesim.forecasting.samples import RoadCutter, add_window
 from stylesim.forecasting.store import MemorySink, SampleStore, StoreBuilder
@@ -23,7 +23,6 @@ from stylesim.forecasting.truth import TrueStyles, Truth, looked_up
 from stylesim.scene import Scene
 
 BATCH_DRIVERS = 64  # drivers per forward pass; chosen: more did not make it faster on two cores
-NO_STYLE = "none"  # as `style` of predict: the null token for everyone
 DT_TOLERANCE_S = 1e-6
 
 

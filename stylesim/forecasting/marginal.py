@@ -16,6 +16,7 @@ from stylesim.forecasting.selection import selected_modes
 if TYPE_CHECKING:
     from stylesim.forecasting.forecaster import TrainedForecaster
 
+NO_STYLE = "none"  # as `style` of predict: the null token for everyone
 MARGINAL = "marginal"  # as `style` of predict: the average over the posterior of styles
 
 
@@ -43,6 +44,8 @@ class AsStyle:
     def __init__(self, forecaster: TrainedForecaster, style: str) -> None:
         self.forecaster, self.style = forecaster, forecaster.known_style(style)
         self.name = f"{forecaster.name.removesuffix(f' ({SEES_FUTURE})')}@{style}"
+        if style == NO_STYLE:
+            self.styles: tuple[str, ...] = ()  # told nothing: see `forecast.is_untold`
 
     @property
     def horizon_s(self) -> float:

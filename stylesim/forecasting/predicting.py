@@ -16,8 +16,8 @@ from stylesim.corpus.files import new_folder, write_whole
 from stylesim.errors import InputError
 from stylesim.forecast import Forecast, Forecaster, ForecastTask, Oracle, covered, earlier_s
 from stylesim.forecasting.conditions import SEES_FUTURE
-from stylesim.forecasting.forecaster import NO_STYLE, TrainedForecaster
-from stylesim.forecasting.marginal import MARGINAL, AsStyle
+from stylesim.forecasting.forecaster import TrainedForecaster
+from stylesim.forecasting.marginal import MARGINAL, NO_STYLE, AsStyle
 from stylesim.forecasting.samples import Progress
 from stylesim.scene import Scene
 from stylesim.windows import WindowSpec, earlier_scene, target_agents

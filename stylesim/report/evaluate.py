@@ -14,7 +14,7 @@ from stylesim.evaluation import evaluate as one_forecaster
 from stylesim.evaluation.metrics import MODES
 from stylesim.evaluation.permuted import permuted, with_placebo_row
 from stylesim.evaluation.results import Evaluation, markdown
-from stylesim.forecast import Forecaster, is_told
+from stylesim.forecast import Forecaster, is_told, is_untold
 from stylesim.report.figures import Curve
 from stylesim.report.html import build_report
 from stylesim.windows import WindowSpec
@@ -88,6 +88,7 @@ def evaluate(
         raise InputError(f"two forecasters have the same name: {', '.join(names)}")
     view = corpus if split is None else corpus.split(split)
     judged_spec = one_forecaster.common_spec(several, spec or WindowSpec())
+    untold = [forecaster.name for forecaster in several if is_untold(forecaster)]
     evaluations: list[Evaluation] = []
     # all get the same questions: what one of them cannot answer, none is asked
     for forecaster in several:
@@ -108,6 +109,6 @@ def evaluate(
             )
             for one in shown
         ]
-        evaluations += [with_placebo_row(*found) if len(found) > 1 else found[0], *found[1:]]
+        evaluations += [with_placebo_row(*found, against=untold) if len(found) > 1 else found[0], *found[1:]]
     curves = {forecaster.name: getattr(forecaster, "training_curve", ()) for forecaster in several}
     return Report(tuple(evaluations), view, {name: curve for name, curve in curves.items() if curve}, seed)

@@ -9,7 +9,7 @@ from stylesim.corpus import Corpus
 from stylesim.evaluation.compare import differences
 from stylesim.evaluation.evaluate import corpus_facts
 from stylesim.evaluation.intervals import Estimate
-from stylesim.evaluation.permuted import PERMUTED
+from stylesim.evaluation.permuted import PERMUTED, PLACEBO_ROW
 from stylesim.evaluation.results import HEADINGS, Evaluation
 from stylesim.evaluation.slices import ALL, LAST, STANDING
 from stylesim.evaluation.strata import title_of
@@ -95,14 +95,19 @@ def warnings(evaluations: Sequence[Evaluation]) -> list[str]:
 
 
 def placebo_warnings(evaluations: Sequence[Evaluation]) -> list[str]:
-    """Forecasters told somebody else's styles that are nevertheless better than one that is told none."""
+    """Forecasters told somebody else's styles that are nevertheless better than the model that is told nothing.
+
+    A baseline without learning is no such model: that a network beats constant velocity says nothing of styles.
+    """
     found = []
-    placebos = [one for one in evaluations if one.forecaster.endswith(f"({PERMUTED})")]
-    told = {one.forecaster.removesuffix(f" ({PERMUTED})") for one in placebos}
-    plain = [one for one in evaluations if one not in placebos and one.forecaster not in told]
-    for placebo in placebos:
-        for base in plain:
-            if placebo.about["corpus"]["fingerprint"] != base.about["corpus"]["fingerprint"]:
+    by_name = {one.forecaster: one for one in evaluations}
+    for told in evaluations:
+        placebo = by_name.get(f"{told.forecaster} ({PERMUTED})")
+        if placebo is None:
+            continue
+        for name in told.about.get(PLACEBO_ROW, {}).get("against", []):
+            base = by_name.get(name)
+            if base is None or placebo.about["corpus"]["fingerprint"] != base.about["corpus"]["fingerprint"]:
                 continue
             gap = differences(placebo, base, ALL)[ALL]["min_fde_m"]
             if not gap.refused and gap.high < 0:

@@ -12,9 +12,10 @@ from stylesim.errors import InputError
 from stylesim.evaluation.asking import questions
 from stylesim.evaluation.permuted import PERMUTED, permuted, placebo_row
 from stylesim.evaluation.results import load_evaluation
-from stylesim.forecast import Forecast, ForecastTask
+from stylesim.forecast import Forecast, ForecastTask, is_untold
 from stylesim.forecasting.baselines import ConstantVelocity
 from stylesim.forecasting.forecaster import TrainedForecaster
+from stylesim.forecasting.marginal import AsStyle
 from stylesim.report.evaluate import evaluate
 from stylesim.report.sections import placebo_warnings
 from tests.unit.forecasting.made import SPEC, made_corpus, untrained
@@ -91,13 +92,26 @@ class Lost:
         return [Forecast(one.mode_m + 1000.0, one.probability) for one in ConstantVelocity().predict(tasks)]
 
 
+class LostAndUntold(Lost):
+    """The same, as a model that could be told of styles."""
+
+    name = "lost model"
+    styles: tuple[str, ...] = ()
+
+
 def test_a_gain_that_is_not_from_the_styles_is_warned_of(model: TrainedForecaster, corpus: Corpus) -> None:
-    assert (
-        "labels permuted) is better than lost"
-        in placebo_warnings(evaluate([Lost(), model], corpus, by=("scenario",), spec=SPEC).evaluations)[0]
-    )
-    good = evaluate([ConstantVelocity(), model], corpus, by=("scenario",), spec=SPEC)  # the model is untrained
-    assert placebo_warnings(good.evaluations) == []
+    beside = [Lost(), LostAndUntold(), model]
+    found = placebo_warnings(evaluate(beside, corpus, by=("scenario",), spec=SPEC).evaluations)
+    # only beside the model that is told nothing: any network beats a baseline, whatever it is told
+    assert len(found) == 1
+    assert "labels permuted) is better than lost model by" in found[0]
+
+
+def test_untold_are_networks_without_style_and_those_that_are_asked_without(model: TrainedForecaster) -> None:
+    assert is_untold(untrained())
+    assert is_untold(AsStyle(model, "none"))
+    for other in (model, AsStyle(model, model.styles[0]), ConstantVelocity()):
+        assert not is_untold(other)
 
 
 def test_who_is_told_nothing_has_nothing_to_permute(corpus: Corpus) -> None:
