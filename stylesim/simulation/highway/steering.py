@@ -15,6 +15,7 @@ LANE_ANGLE_RAD = 0.35  # chosen: largest angle to the lane; highway-env's 45 deg
 WHEEL_RAD = 0.7  # chosen: lock of the front wheels; with highway-env's geometry a turning radius of 6.4 m
 WHEEL_RAD_PS = 2.0  # chosen: how fast a driver turns them; without a limit the lateral velocity jumps
 LATERAL_MPS2 = 3.8  # chosen, because 4 m/s2 is what people accept at most, and discretisation adds a little
+LEAST_LATERAL_MPS2 = 1.0  # chosen: whatever the pedal does, so much is left to steer with
 BEND_MARGIN = 1.1  # chosen: over what the bend itself takes, so that the car can come back to the centre
 SLOW_MPS = 0.01  # as highway-env's not_zero
 
@@ -49,14 +50,16 @@ def turned_wheel_rad(wheel_rad: float, wish_rad: float, car: Any, dt: float) -> 
     """The wheel angle after dt: as wished, as fast as a driver turns, without more lateral acceleration than accepted.
 
     In the bicycle model the course turns with the body, v sin(b) / (L / 2), and with the slip b itself, db/dt; both
-    together times the speed are the lateral acceleration, which bounds the new slip.
+    together times the speed are the acceleration across the course. Across the body, where people sit, what the pedal
+    does adds a sin(b) at most; the rest of what is accepted bounds the new slip.
     """
     most = WHEEL_RAD_PS * dt
     wheel = wheel_rad + min(max(wish_rad - wheel_rad, -most), most)
     speed = max(car.speed, 1.0)
     before, wanted = math.atan(math.tan(wheel_rad) / 2), math.atan(math.tan(wheel) / 2)
     kept, weight = speed * before / dt, speed * speed / (car.LENGTH / 2) + speed / dt
-    slip = min(max(wanted, (kept - car.lateral_mps2) / weight), (kept + car.lateral_mps2) / weight)
+    accepted = max(car.lateral_mps2 - abs(car.acceleration_mps2 * math.sin(before)), LEAST_LATERAL_MPS2)
+    slip = min(max(wanted, (kept - accepted) / weight), (kept + accepted) / weight)
     return wheel if slip == wanted else math.atan(2 * math.tan(slip))
 
 

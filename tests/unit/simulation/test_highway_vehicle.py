@@ -13,6 +13,7 @@ from highway_env.road.road import RoadNetwork
 from stylesim.simulation.highway.following import cool
 from stylesim.simulation.highway.noise import OrnsteinUhlenbeck
 from stylesim.simulation.highway.road import StyledRoad
+from stylesim.simulation.highway.steering import WHEEL_RAD, turned_wheel_rad
 from stylesim.simulation.highway.vehicle import StyledVehicle
 from stylesim.style import CLASS_KNOB
 from stylesim.styles import style_table
@@ -167,3 +168,22 @@ def test_who_looks_at_others_drives_by_what_they_drive():
     around = np.mean([other.speed for other in on.vehicles if other is not vehicle])
     assert vehicle.wished_speed_mps == pytest.approx(min(1.1 * around, 1.25 * 0.85 * LIMIT), rel=0.03)
     assert all(other.flow_ratio == 1.0 for other in on.vehicles if other is not vehicle)
+
+
+@pytest.mark.parametrize("pedal_mps2", [-3.0, 0.0, 3.0])
+def test_who_turns_and_presses_a_pedal_stays_within_the_lateral_acceleration_that_is_accepted(pedal_mps2):
+    vehicle = car(road(), "aggressive", 10.0, speed=8.0)
+    vehicle.acceleration_mps2, wheel, dt = pedal_mps2, 0.0, 0.05
+    across, before = [], None
+    for _ in range(16):
+        wheel = turned_wheel_rad(wheel, WHEEL_RAD, vehicle, dt)
+        slip = np.arctan(np.tan(wheel) / 2)
+        course = vehicle.heading + slip
+        now = vehicle.speed * np.array([np.cos(course), np.sin(course)])
+        if before is not None:
+            change = (now - before) / dt
+            across.append(change[1] * np.cos(vehicle.heading) - change[0] * np.sin(vehicle.heading))
+        before = now
+        vehicle.heading += vehicle.speed * np.sin(slip) / (vehicle.LENGTH / 2) * dt
+        vehicle.speed += pedal_mps2 * dt
+    assert 3.0 < max(across) < 4.0
