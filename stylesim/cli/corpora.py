@@ -134,7 +134,8 @@ def verify(path: Path = typer.Argument(help="A corpus.")) -> None:
 
     with progress_bar("verifying", "scenes") as progress:
         result = run(path, progress=progress)
-    show_table("Counted", ("what", "n"), sorted(result.counts.items()))
+    if result.counts:  # of a damaged corpus nothing may be countable
+        show_table("Counted", ("what", "n"), sorted(result.counts.items()))
     for line in result.errors[:SHOWN_ERRORS]:
         err(line)
     if len(result.errors) > SHOWN_ERRORS:

@@ -23,8 +23,13 @@ class What(StrEnum):
     datasets = "datasets"
 
 
-def list_(what: What = typer.Argument(help="What to list.")) -> None:
+def list_(what: What | None = typer.Argument(None, help="What to list; without it all four.")) -> None:
     """List scenarios, populations, styles or data-set formats."""
+    for one in What if what is None else (what,):
+        _show(one)
+
+
+def _show(what: What) -> None:
     if what is What.scenarios:
         listed = [(s.name, s.backend, f"{s.duration_s:g}", s.title) for s in map(load_scenario, scenarios())]
         show_table("Scenarios", ("name", "backend", "seconds", "what it is"), listed)

@@ -62,7 +62,7 @@ def train(
     fusion: Fusion = typer.Option(
         Fusion.early, help="Where the style enters the network (without --condition it does not)."
     ),
-    size: str = typer.Option("tiny", help="tiny, small or base."),
+    size: str = typer.Option("tiny", help="mini (for many short trainings), tiny, small or base."),
     reading: Reading = typer.Option(Reading.R1, help="How style, cluster and context make one embedding."),
     style_dropout: float = typer.Option(
         0.125, min=0.0, max=0.99, help="Share of samples whose style is hidden in training."

@@ -125,28 +125,14 @@ def generate(
         crowd = crowd.calibrated(calibration)
     if from_ is not None:
         asked_for = {"a scenario": scenario, "--net": net, "--twins-at": twins_at, "--twins-from": twins_from}
-        asked_for |= {
-            "--twin-style": twin_style,
-            "--stressor": stressor,
-            "--ego": ego,
-            "--net": net,
-            "--workers": workers > 1,
-        }
+        asked_for |= {"--twin-style": twin_style, "--stressor": stressor, "--ego": ego, "--workers": workers > 1}
         unused = [name for name, value in asked_for.items() if value not in (None, "", False, [])]
         corpus = continue_recording(
-            from_,
-            crowd,
-            scenes=scene,
-            drivers=drivers,
-            at_s=at,
-            out=out,
-            episodes=episodes,
-            seed=seed,
-            resume=resume,
-            unused=unused,
-        )
+            from_, crowd, scenes=scene, drivers=drivers, at_s=at, unused=unused,
+            out=out, episodes=episodes, seed=seed, resume=resume,
+        )  # fmt: skip
         _show_counts(corpus, crowd)
-        say(f"{len(corpus)} scenes, {corpus.manifest['n_steps']} agent-steps: {out}")
+        say(f"{_number(corpus, 'scene')}, {corpus.manifest['n_steps']} agent-steps: {out}")
         return
     if scene or at is not None or drivers != "all":
         raise InputError("--scene, --drivers and --at say what of a recording goes on; name it with --from CORPUS")
@@ -155,20 +141,16 @@ def generate(
     names = wanted_scenarios(scenario or [], net, demand, vph)
     with progress_bar("generating", "episodes") as progress:
         corpus = run(
-            names,
-            crowd,
-            episodes=episodes,
-            seed=seed,
-            out=out,
-            workers=workers,
-            resume=resume,
-            plan=plan,
-            twins=twins,
-            progress=progress,
-        )
+            names, crowd, episodes=episodes, seed=seed, out=out, workers=workers, resume=resume,
+            plan=plan, twins=twins, progress=progress,
+        )  # fmt: skip
     _show_counts(corpus, crowd)
     paired = f" ({sum(bool(info.twin_of) for info in corpus.info)} of them twins)" if twins is not None else ""
-    say(f"{len(corpus)} episodes{paired}, {corpus.manifest['n_steps']} vehicle-steps: {out}")
+    say(f"{_number(corpus, 'episode')}{paired}, {corpus.manifest['n_steps']} vehicle-steps: {out}")
+
+
+def _number(corpus: Corpus, what: str) -> str:
+    return f"{len(corpus)} {what}" if len(corpus) == 1 else f"{len(corpus)} {what}s"
 
 
 def _show_counts(corpus: Corpus, crowd: Population) -> None:
@@ -180,7 +162,11 @@ def _show_counts(corpus: Corpus, crowd: Population) -> None:
     asked = crowd.by_class | {"neutral": 1.0}
     rows = [(name, n, f"{n / total:.3f}", f"{asked[name]:.3f}") for name, n in drivers.items()]
     show_table("Drivers", ("style", "drivers", "share", "asked for"), rows)
-    others = {key: n for key, n in sorted(counts.items()) if not key.startswith("drivers.") and n}
+    others = {
+        "drivers in SUMO's demand, warm-up included" if key == "drivers" else key: n
+        for key, n in sorted(counts.items())
+        if not key.startswith("drivers.") and n
+    }
     if others:
         show_table("Counted", ("what", "n"), list(others.items()))
 

@@ -42,6 +42,13 @@ def _shares(labels: StyleLabels) -> list[tuple[str, int, str]]:
     ]
 
 
+def _who(corpus: Corpus, labels: StyleLabels, scale: str) -> str:
+    """Whose scale judged, and how many tracks of the corpus were not labelled."""
+    left = sum(info.n_agents for info in corpus.info) - len(labels)
+    judged = f"judged by the scale of {scale}; " if scale else ""
+    return f"{judged}{left} of {left + len(labels)} tracks are not labelled: no motor vehicles"
+
+
 def _clamped(scaler: FeatureScaler, labels: StyleLabels) -> list[tuple[str, str, str]]:
     from stylesim.labelers.scaler import clamped_shares
 
@@ -89,6 +96,7 @@ def label(
     """Label every track, and every history window, by driving style."""
     from stylesim.corpus import Corpus
     from stylesim.labelers.labelling import label as run
+    from stylesim.labelers.reference import DEFAULT_REFERENCE
     from stylesim.labelers.tdbm import TDBM
 
     spec = WindowSpec(window, future, stride)
@@ -97,6 +105,7 @@ def label(
     with progress_bar(f"labelling {corpus.name} by {method.value}", "scenes") as progress:
         labels = run(opened, labeler, spec=spec, progress=progress)
     show_table(f"{method.value}: {len(labels)} tracks", ("style", "tracks", "share"), _shares(labels))
+    say(_who(opened, labels, "" if method is Method.mdsi else str(fit or DEFAULT_REFERENCE)))
     if isinstance(labeler, TDBM):  # KDSC clamps nothing
         shares = _clamped(labeler.track_scaler_, labels)
         show_table("share of each feature clamped", ("feature", "below the scale", "above the scale"), shares)

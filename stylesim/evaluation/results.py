@@ -94,7 +94,7 @@ class Evaluation:
 def load_evaluation(path: str | Path) -> Evaluation:
     """The evaluation that `save` wrote at `<path>.json` and `<path>.parquet`; InputError if it is none."""
     file = Path(path)
-    file = file if file.suffix == ".json" else file.with_name(file.name + ".json")
+    file = file if file.suffix == ".json" or file.is_file() else file.with_name(file.name + ".json")
     table = file.with_suffix(".parquet")
     try:
         raw = json.loads(file.read_text(encoding="utf-8"))

@@ -26,7 +26,7 @@ from stylesim.forecasting.reweighting import group_report, identified, loss_weig
 from stylesim.forecasting.robust import RobustSettings
 from stylesim.forecasting.samples import SPLITS, Progress, compiled
 from stylesim.forecasting.styling import styled_data, with_styles
-from stylesim.forecasting.training_folder import check_same, opened, write_json
+from stylesim.forecasting.training_folder import check_same, forgotten_if_refused, opened, write_json
 from stylesim.randomness import stream
 from stylesim.resources import cache_dir
 from stylesim.windows import WindowSpec
@@ -101,14 +101,15 @@ def train(
     if resume and (out / MODEL_FILE).exists():
         check_same(record, out)
         return load(out)
+    place = runtime(accelerator, precision, compiled=compiled)
     folder = opened(out, record, resume=resume)
     watch = _Watch(stage, progress)
     kept = cache or cache_dir()
-    conditioner, data, groups = _training_set(
-        corpus, added, condition, spec, inputs, judges, robust, dense=dense, seed=seed, cache=kept, watch=watch
-    )
+    with forgotten_if_refused(folder):
+        conditioner, data, groups = _training_set(
+            corpus, added, condition, spec, inputs, judges, robust, dense=dense, seed=seed, cache=kept, watch=watch
+        )
     config = with_styles(config, conditioner)
-    place = runtime(accelerator, precision, compiled=compiled)
     if "jtt" in robust.methods:
         first, told = _network(config, data, seed), watch.begin("identifying what is hard")
         data = identified(data, first, settings, robust, runtime=place, folder=folder / FIRST_FOLDER, progress=told)

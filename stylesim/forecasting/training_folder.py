@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import json
 import shutil
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
@@ -24,6 +26,17 @@ def opened(out: Path, record: dict[str, Any], *, resume: bool) -> Path:
     shutil.rmtree(partial, ignore_errors=True)
     write_json(partial / RECORD_FILE, record)
     return partial
+
+
+@contextmanager
+def forgotten_if_refused(folder: Path) -> Iterator[None]:
+    """Removes a folder without a finished epoch where the data is refused: nothing in it could be resumed."""
+    try:
+        yield
+    except InputError:
+        if not (folder / STATE_FILE).exists():
+            shutil.rmtree(folder)
+        raise
 
 
 def check_same(record: dict[str, Any], folder: Path) -> None:

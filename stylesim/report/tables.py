@@ -64,7 +64,7 @@ def size_text(size: Estimate) -> str:
 def estimate_cell(value: Estimate | None, *, judge: bool = False, digits: int = 2) -> Cell:
     """`1.63` over `[1.20, 2.10]`; "too few" where refused, † where within site.
 
-    `judge` marks intervals that exclude 0.
+    `judge` marks intervals that exclude 0, but no difference that is 0 as printed: rounding errors have a sign, too.
     """
     if value is None:
         return Cell(EM, look="refused")
@@ -73,7 +73,8 @@ def estimate_cell(value: Estimate | None, *, judge: bool = False, digits: int = 
     note = f"[{number(value.low, digits)}, {number(value.high, digits)}]"
     if value.status == "within site":
         return Cell(number(value.value, digits), f"{note} †", "within")
-    look = ("better" if value.high < 0 else "worse") if judge and value.excludes_zero else "number"
+    differs = judge and value.excludes_zero and round(value.value, digits) != 0
+    look = ("better" if value.high < 0 else "worse") if differs else "number"
     return Cell(number(value.value, digits), note, look)
 
 

@@ -235,3 +235,19 @@ def test_every_verb_has_help_with_an_example(verb, stylesim):
     said = stylesim(verb, "--help")
     assert said.code == 0
     assert f"Example: `stylesim {verb}" in said.out
+
+
+def test_a_refused_training_leaves_nothing_that_blocks_the_next_verb(stylesim, corpus, tmp_path):
+    for words, message in (
+        (["--history", "500"], "no agent with a whole history"),
+        (["--precision", "8-bit"], "precision"),
+    ):
+        said = stylesim("train", corpus, *words, "--out", tmp_path / "model")
+        assert (said.code, message in said.err) == (2, True)
+        assert [path.name for path in tmp_path.iterdir()] == ["corpus"]
+
+
+def test_comparing_what_is_no_evaluation_names_the_file(stylesim, tmp_path):
+    (tmp_path / "labels.csv").write_text("scene_id,style\n")
+    said = stylesim("compare", tmp_path / "labels.csv", tmp_path / "labels.csv")
+    assert (said.code, f"{tmp_path / 'labels.csv'} (or the .parquet" in said.err) == (2, True)

@@ -53,7 +53,7 @@ def test_printed_commands_exist(page):
     "wrong", ["stylesim generat highway", "stylesim merge A --splits 1,0,0", "stylesim export av3 A"]
 )
 def test_wrong_commands_are_found(wrong):
-    with pytest.raises(AssertionError, match="no verb|no option"):
+    with pytest.raises(AssertionError, match=r"no verb|no option"):
         check_command(shlex.split(wrong)[1:], VERBS)
 
 
