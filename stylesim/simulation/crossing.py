@@ -9,7 +9,8 @@ import numpy as np
 from jaxtyping import Float64
 
 from stylesim.road import Lane, Road
-from stylesim.simulation.stressors import Attempt, Walker
+from stylesim.simulation.stressors import Attempt
+from stylesim.simulation.walkers import Walker
 from stylesim.tracks import AgentKind
 
 REACH_M = 30.0  # beyond it nothing belongs to the same road

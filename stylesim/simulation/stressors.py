@@ -5,26 +5,22 @@ docs/stressors.md says what each does, with the sources of the numbers.
 
 from __future__ import annotations
 
-import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
-from jaxtyping import Float64
 
 from stylesim.errors import InputError
-from stylesim.overlaps import overlaps
 from stylesim.randomness import stream
 from stylesim.road import Road
 from stylesim.scene import Scene
 from stylesim.simulation.plan import EpisodePlan, StressorKind
-from stylesim.tracks import AgentKind, TrackFlag, Tracks
+from stylesim.simulation.walkers import Walker, with_walkers
+from stylesim.tracks import TrackFlag
 
-EARLIEST, LATEST = (
-    0.15,
-    0.6,
-)  # shares of the log between which an event may begin; chosen, so that it is seen to its end
+# Shares of the log between which an event may begin; chosen, so that it is seen to its end.
+EARLIEST, LATEST = 0.15, 0.6
 LAST_CHANCE = 0.8  # a moment that finds nobody is tried again until then
 
 
@@ -110,88 +106,12 @@ class Event:
 
 
 @dataclass(frozen=True)
-class Walker:
-    """A pedestrian or an animal that crosses the road in a straight line and looks at nobody."""
-
-    name: str
-    kind: AgentKind
-    length_m: float  # in walking direction
-    width_m: float
-    start_m: tuple[float, float]
-    heading_rad: float
-    speed_mps: float
-    begin_s: float  # of the log
-    end_s: float
-
-    @property
-    def velocity_mps(self) -> tuple[float, float]:
-        """While it walks."""
-        return self.speed_mps * math.cos(self.heading_rad), self.speed_mps * math.sin(self.heading_rad)
-
-    def position_m(self, time_s: float) -> tuple[float, float]:
-        """Where it is then."""
-        way = self.speed_mps * (time_s - self.begin_s)
-        return self.start_m[0] + way * math.cos(self.heading_rad), self.start_m[1] + way * math.sin(self.heading_rad)
-
-
-@dataclass(frozen=True)
 class Outcome:
     """What the stressors of one episode came to."""
 
     events: tuple[Event, ...] = ()
     walkers: tuple[Walker, ...] = ()
     missed: tuple[StressorKind, ...] = ()  # nobody fitted at their moment
-
-
-def _walker_tracks(walkers: Sequence[Walker], tracks: Tracks) -> Tracks:
-    time_s: Float64[np.ndarray, " time"] = np.arange(tracks.n_frames) * tracks.dt_s
-    begin, end = (np.array([getattr(w, name) for w in walkers])[:, None] for name in ("begin_s", "end_s"))
-    valid = (time_s >= begin - 1e-9) & (time_s <= end + 1e-9)
-    course, speed = (np.array([getattr(w, name) for w in walkers]) for name in ("heading_rad", "speed_mps"))
-    velocity = (speed[:, None] * np.stack([np.cos(course), np.sin(course)], axis=-1))[:, None]
-    place = np.array([w.start_m for w in walkers])[:, None] + (time_s - begin)[..., None] * velocity
-    blank = np.where(valid, 0.0, np.nan)
-    return Tracks(
-        agent_id=tuple(w.name for w in walkers),
-        kind=np.array([int(w.kind) for w in walkers]),
-        size_m=np.array([[w.length_m, w.width_m] for w in walkers]),
-        position_m=place + blank[..., None],
-        velocity_mps=velocity + blank[..., None],
-        heading_rad=course[:, None] + blank,
-        valid=valid,
-        dt_s=tracks.dt_s,
-        origin_m=tracks.origin_m,
-        flags=np.full(len(walkers), int(TrackFlag.STRESSOR)),
-    )
-
-
-def _first_hits(tracks: Tracks, walkers: int) -> list[tuple[int, int, int]]:
-    """(frame, agent, walker) of the first overlap of boxes of each of the last `walkers` agents with anybody."""
-    agent, frame = np.nonzero(tracks.valid)
-    place, heading = tracks.position_m[agent, frame], tracks.heading_rad[agent, frame]
-    found = overlaps(frame, agent, place, heading, tracks.size_m[agent])
-    first: dict[int, tuple[int, int, int]] = {}
-    for when, a, b in sorted(found.tolist()):
-        walker = max(a, b)
-        if walker >= tracks.n_agents - walkers and walker not in first:
-            first[walker] = (when, min(a, b), walker)
-    return list(first.values())
-
-
-def _with_walkers(tracks: Tracks, walkers: Sequence[Walker]) -> tuple[Tracks, int]:
-    """The tracks with the walkers', and how many of them are hit: there a walker's track ends."""
-    both = joined(tracks, _walker_tracks(walkers, tracks))
-    hits = _first_hits(both, len(walkers))
-    floats = ("position_m", "velocity_mps", "heading_rad")
-    arrays: dict[str, Any] = {name: np.array(getattr(both, name)) for name in (*floats, "valid")}
-    flags = np.array(both.flags)
-    for frame, agent, walker in hits:
-        flags[[agent, walker]] |= int(TrackFlag.COLLIDED)
-        flags[walker] |= int(TrackFlag.REMOVED)
-        arrays["valid"][walker, frame + 1 :] = False
-        for name in floats:
-            arrays[name][walker, frame + 1 :] = np.nan
-    return replace(both, flags=flags, **arrays), len(hits)
 
 
 def with_events(scene: Scene, outcome: Outcome, plan: EpisodePlan) -> Scene:
@@ -201,7 +121,7 @@ def with_events(scene: Scene, outcome: Outcome, plan: EpisodePlan) -> Scene:
     tracks, counts = scene.tracks, dict(scene.counts)
     walkers = [w for w in outcome.walkers if w.begin_s < (tracks.n_frames - 1) * tracks.dt_s]
     if walkers:
-        tracks, hit = _with_walkers(tracks, walkers)
+        tracks, hit = with_walkers(tracks, walkers)
         counts["collisions"] = counts.get("collisions", 0) + hit
         counts["collided"] = int(tracks.flagged(TrackFlag.COLLIDED).sum())
         counts["walkers"], counts["walkers_hit"] = len(walkers), hit
@@ -218,10 +138,3 @@ def with_events(scene: Scene, outcome: Outcome, plan: EpisodePlan) -> Scene:
     return replace(
         scene, tracks=replace(tracks, flags=flags), counts=counts, metadata={**scene.metadata, "events": events}
     )
-
-
-def joined(one: Tracks, other: Tracks) -> Tracks:
-    """The road users of both, on their common clock."""
-    names = ("kind", "size_m", "position_m", "velocity_mps", "heading_rad", "valid", "flags")
-    arrays: dict[str, Any] = {name: np.concatenate([getattr(one, name), getattr(other, name)]) for name in names}
-    return replace(one, agent_id=one.agent_id + other.agent_id, driver=one.driver + other.driver, **arrays)

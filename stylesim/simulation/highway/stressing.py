@@ -14,7 +14,8 @@ from stylesim.simulation.highway.spec import LOG_HZ
 from stylesim.simulation.highway.traffic import Crew, Traffic
 from stylesim.simulation.highway.vehicle import StyledVehicle
 from stylesim.simulation.plan import StressorKind
-from stylesim.simulation.stressors import Attempt, Event, Outcome, Walker
+from stylesim.simulation.stressors import Attempt, Event, Outcome
+from stylesim.simulation.walkers import Walker
 from stylesim.simulation.yielding import SIGHT_M, Yield
 
 SLOWEST_MPS = 5.0  # who is slower is in a queue, where nothing unusual happens

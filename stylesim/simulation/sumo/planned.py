@@ -18,13 +18,13 @@ from stylesim.planners.seen import Frame, Place
 from stylesim.randomness import stream
 from stylesim.scene import Scene
 from stylesim.signals import SignalState
-from stylesim.simulation.stressors import Walker
 from stylesim.simulation.sumo.episode import DT_S, EpisodeFiles
 from stylesim.simulation.sumo.live import poses_of, shifted
 from stylesim.simulation.sumo.live_wander import Wander
 from stylesim.simulation.sumo.recorder import EXTRA
 from stylesim.simulation.sumo.signals import STATES, main_link
 from stylesim.simulation.sumo.takeover import places, take_over
+from stylesim.simulation.walkers import Walker
 from stylesim.tracks import AgentKind
 
 VEHICLE = f"{EXTRA}{EGO_ID}"  # its id in SUMO; the recorder leaves it to us

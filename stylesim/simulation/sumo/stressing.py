@@ -11,7 +11,7 @@ from dataclasses import replace
 from typing import Any, Protocol, runtime_checkable
 
 from stylesim.simulation.crossing import barriers, length_m, meeting
-from stylesim.simulation.stressors import Attempt, Event, Outcome, Walker, attempts
+from stylesim.simulation.stressors import Attempt, Event, Outcome, attempts
 from stylesim.simulation.sumo.episode import DT_S, EpisodeFiles
 from stylesim.simulation.sumo.stressor_acts import Braking, CuttingIn, RunningRed
 from stylesim.simulation.sumo.surroundings import (
@@ -23,6 +23,7 @@ from stylesim.simulation.sumo.surroundings import (
     room_beside,
 )
 from stylesim.simulation.sumo.yielding import Yielding
+from stylesim.simulation.walkers import Walker
 
 SLOWEST_MPS = 5.0  # who is slower is in a queue, where nothing unusual happens
 LEAST_AHEAD_S = 4.0  # to the end of the lane; chosen, so that the event is over before a junction or the log's end

@@ -14,7 +14,8 @@ from stylesim.randomness import stream
 from stylesim.road import Lane, Road
 from stylesim.simulation.crossing import VERGE_M, barriers, lanes_crossed, meeting
 from stylesim.simulation.plan import STRESSOR_KINDS, EpisodePlan, Stressor, stressors_of
-from stylesim.simulation.stressors import Attempt, Event, Outcome, Walker, attempts, check_possible, with_events
+from stylesim.simulation.stressors import Attempt, Event, Outcome, attempts, check_possible, with_events
+from stylesim.simulation.walkers import Walker
 from stylesim.simulation.yielding import HARDEST_MPS2, STOPS_BEFORE_M, Yield
 from stylesim.styles import style_table
 from stylesim.tracks import AgentKind, TrackFlag
