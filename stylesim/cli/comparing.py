@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import math
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -10,7 +9,7 @@ from typing import TYPE_CHECKING
 import typer
 
 from stylesim.cli.console import progress_bar, say, show_table
-from stylesim.errors import InputError
+from stylesim.cli.figures import check_endings, write_figures
 
 if TYPE_CHECKING:
     from stylesim.evaluation.exposure import Rate
@@ -82,29 +81,14 @@ def realism(
 ) -> None:
     """How far simulated traffic is from recordings, and recordings from each other, matched by speed and density."""
     from stylesim.corpus import Corpus
-    from stylesim.corpus.files import write_whole
     from stylesim.evaluation.realism import realism as run
 
-    if out is not None and out.suffix != ".json":
-        raise InputError(f"--out {out}: figures are written as .json")
-    if report is not None and report.suffix != ".html":
-        raise InputError(f"--report {report}: a report is an .html file")
+    check_endings(out, report)
     opened, recorded = Corpus(sim), [Corpus(path) for path in real]
     with progress_bar("measuring", "scenes") as progress:
-        last = [""]
-
-        def tell(stage: str, done: int, total: int) -> None:
-            if stage != last[0]:
-                last[0] = stage
-                progress.stage(stage, "scenes")
-            progress(done, total)
-
-        found = run(opened, recorded, reference=reference, seed=seed, progress=tell)
+        found = run(opened, recorded, reference=reference, seed=seed, progress=progress.told)
     show_realism(found)
-    if out is not None:
-        text = json.dumps(found.to_dict(), indent=1, sort_keys=True, allow_nan=False, ensure_ascii=False)
-        write_whole(out, text.encode())
-        say(f"{out}")
+    write_figures(out, found.to_dict())
     if report is not None:
         from stylesim.report.realism_page import save_realism
 

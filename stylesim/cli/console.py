@@ -66,6 +66,12 @@ class Bar:
         """What is counted from here on gets a bar of its own."""
         self._title, self._unit, self._task = title, unit, None
 
+    def told(self, stage: str, done: int, total: int) -> None:
+        """The library's `progress(stage, done, total)`: a bar for each stage."""
+        if stage != self._title:
+            self.stage(stage, self._unit)
+        self(done, total)
+
 
 @contextmanager
 def progress_bar(title: str, unit: str = "") -> Iterator[Bar]:

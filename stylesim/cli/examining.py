@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 import typer
 
 from stylesim.cli.console import progress_bar, say, show_table
-from stylesim.errors import InputError
+from stylesim.cli.figures import check_endings, write_figures
 
 if TYPE_CHECKING:
     from stylesim.evaluation.comparison import Comparison
@@ -26,18 +26,12 @@ def compare(
     report: Path | None = typer.Option(None, "--report", help="Write an HTML page with figures to this file."),
 ) -> None:
     """Paired differences of two forecasters on the same windows, with 95 % intervals; below 0 the first is better."""
-    from stylesim.corpus.files import json_bytes, write_whole
     from stylesim.evaluation.comparison import compare as run
 
-    if out is not None and out.suffix != ".json":
-        raise InputError(f"--out {out}: figures are written as .json")
-    if report is not None and report.suffix != ".html":
-        raise InputError(f"--report {report}: a report is an .html file")
+    check_endings(out, report)
     found = run(ours, theirs, by=by, seed=seed)
     show_comparison(found)
-    if out is not None:
-        write_whole(out, json_bytes(found.to_dict()))
-        say(f"{out}")
+    write_figures(out, found.to_dict())
     if report is not None:
         from stylesim.report.compare_page import save_comparison
 

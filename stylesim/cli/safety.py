@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import math
 from enum import StrEnum
 from pathlib import Path
@@ -10,8 +9,8 @@ from typing import TYPE_CHECKING
 
 import typer
 
-from stylesim.cli.console import progress_bar, say, show_table
-from stylesim.errors import InputError
+from stylesim.cli.console import progress_bar, show_table
+from stylesim.cli.figures import check_endings, write_figures
 
 if TYPE_CHECKING:
     from stylesim.evaluation.criticality import Criticality
@@ -80,19 +79,14 @@ def criticality(
 ) -> None:
     """Time to collision, headway, required deceleration, post-encroachment time and collisions, by style."""
     from stylesim.corpus import Corpus
-    from stylesim.corpus.files import write_whole
     from stylesim.evaluation.criticality import criticality as run
 
-    if out is not None and out.suffix != ".json":
-        raise InputError(f"--out {out}: figures are written as .json")
+    check_endings(out)
     opened = Corpus(corpus)
     with progress_bar("measuring encounters", "scenes") as progress:
         found = run(opened, as_population=as_population, by=by.value, seed=seed, progress=progress)
     show_criticality(found)
-    if out is not None:
-        text = json.dumps(found.to_dict(), indent=1, sort_keys=True, allow_nan=False, ensure_ascii=False)
-        write_whole(out, text.encode())
-        say(f"{out}")
+    write_figures(out, found.to_dict())
 
 
 def add_to(app: typer.Typer) -> None:
