@@ -21,7 +21,7 @@ from stylesim.errors import InputError
 from stylesim.labelers.reference import DEFAULT_REFERENCE, default_labeler, load_labeler
 from stylesim.labelers.tdbm import TDBM
 from stylesim.population import Population
-from stylesim.simulation.generate import SIMULATORS
+from stylesim.simulation.request import SIMULATORS
 from stylesim.styles import Calibration, load_calibration
 from stylesim.version import __version__
 

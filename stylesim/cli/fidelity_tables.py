@@ -9,8 +9,8 @@ from stylesim.cli.console import say, show_table
 from stylesim.style import STYLE_CLASSES
 
 if TYPE_CHECKING:
-    from stylesim.evaluation.fidelity import Fidelity
     from stylesim.evaluation.fidelity_agreement import Agreement
+    from stylesim.evaluation.fidelity_results import Fidelity
     from stylesim.evaluation.freedom import Freedom
     from stylesim.evaluation.intervals import Estimate
 
@@ -110,7 +110,7 @@ def _robust(found: Fidelity) -> None:
 
 def show_fidelity(found: Fidelity) -> None:
     """Every table on stdout."""
-    from stylesim.evaluation.fidelity import EVERYONE
+    from stylesim.evaluation.fidelity_results import EVERYONE
 
     names = {"tdbm": "TDBM, printed orientation", "tdbm_transposed": "TDBM, transposed"}
     spans = {"track": "whole trips", "window": "11 s windows"}

@@ -13,7 +13,7 @@ from stylesim.cli.fidelity_tables import show_fidelity, show_room
 from stylesim.cli.figures import check_endings, write_figures
 
 if TYPE_CHECKING:
-    from stylesim.evaluation.fidelity import Fidelity
+    from stylesim.evaluation.fidelity_results import Fidelity
     from stylesim.evaluation.freedom import Freedom
 
 

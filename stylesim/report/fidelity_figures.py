@@ -8,9 +8,9 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from stylesim.evaluation.fidelity import Fidelity
 from stylesim.evaluation.fidelity_agreement import Agreement
 from stylesim.evaluation.fidelity_ranges import FeatureRanges, needed_ranges
+from stylesim.evaluation.fidelity_results import Fidelity
 from stylesim.report.figures import WIDTH
 from stylesim.report.theme import FAINT, INK, drawing, new_figure, style_colour, style_marker
 from stylesim.style import CLASS_INTERVAL, STYLE_CLASSES

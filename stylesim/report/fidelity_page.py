@@ -9,8 +9,8 @@ from pathlib import Path
 
 from stylesim.corpus.files import write_whole
 from stylesim.errors import InputError
-from stylesim.evaluation.fidelity import EVERYONE, Fidelity
 from stylesim.evaluation.fidelity_agreement import TITLES, Agreement
+from stylesim.evaluation.fidelity_results import EVERYONE, Fidelity
 from stylesim.evaluation.fidelity_targets import CLASSES, EXCLUDED_AT_MOST, targets_of, verdict
 from stylesim.evaluation.label_summary import RANK_CEILING
 from stylesim.report.blocks import Block, Section, picture

@@ -17,8 +17,8 @@ from stylesim.errors import CorpusError, InputError
 from stylesim.population import Population
 from stylesim.scenario import Scenario, load_scenario, scenarios
 from stylesim.scene import Scene
-from stylesim.simulation.generate import SOURCE, configuration
 from stylesim.simulation.plan import EpisodePlan, TwinRequest
+from stylesim.simulation.request import SOURCE, configuration
 from stylesim.simulation.workers import EpisodeRunner, Job, Task
 from stylesim.version import __version__
 

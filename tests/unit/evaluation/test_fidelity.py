@@ -12,8 +12,9 @@ import pytest
 from stylesim.corpus import Corpus, CorpusWriter
 from stylesim.errors import InputError
 from stylesim.evaluation.commanded import CUT, LEFT, LOST, commanded_drivers
-from stylesim.evaluation.fidelity import EVERYONE, fidelity
+from stylesim.evaluation.fidelity import fidelity
 from stylesim.evaluation.fidelity_ranges import needed_ranges
+from stylesim.evaluation.fidelity_results import EVERYONE
 from stylesim.evaluation.fidelity_robustness import DEFAULT, NO_WANDER
 from stylesim.evaluation.scaler_guard import check_unseen
 from stylesim.labelers.features import FEATURES

@@ -10,7 +10,8 @@ import pytest
 
 from stylesim.corpus import CorpusWriter
 from stylesim.errors import InputError
-from stylesim.evaluation.fidelity import Fidelity, fidelity
+from stylesim.evaluation.fidelity import fidelity
+from stylesim.evaluation.fidelity_results import Fidelity
 from stylesim.report.fidelity_page import save_fidelity
 from tests.conftest import make_scene
 
