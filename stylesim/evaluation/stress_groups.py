@@ -99,7 +99,7 @@ def degradation(moving: pl.DataFrame, *, seed: int) -> tuple[Degradation, ...]:
     """Per scenario, and over all of them with equal weight; () without both populations.
 
     Both populations drove the same scenarios; means are compared within each, their episodes resampled independently.
-    `change.n_drivers` is the smaller population's.
+    `change.n_drivers` is the smaller population's, over all scenarios their sum (refused: the least).
     """
     if {EVERYDAY, RARE} - set(moving[POPULATION].unique()):
         return ()
@@ -154,5 +154,6 @@ def _together(parts: list[Estimate], draws: list[Float64[np.ndarray, " draw"]]) 
     status = status_of(n, units)
     if status == "too few":
         return Estimate(np.nan, np.nan, np.nan, n, units, status)
+    n, units = sum(part.n_drivers for part in parts), sum(part.n_units for part in parts)
     low, high = np.percentile(np.mean(draws, axis=0), [_TAIL, 100 - _TAIL])
     return Estimate(float(np.mean([part.value for part in parts])), float(low), float(high), n, units, status)

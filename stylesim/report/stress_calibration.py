@@ -38,8 +38,13 @@ def calibration_section(found: Sequence[Stress]) -> Section:
         ] or [(Cell(one.forecaster, look="head"), Cell("all"), Cell(EM, "one mode", "refused"))]  # fmt: skip
     table = Table("Expected calibration error of mode probabilities", ("forecaster", "drivers", "ECE"), grouped(rows))
     blocks.append(Block(table=table))
+    # Open: everyday discs held against rare drivers; where there is one population only, its own.
+    crossed = any(each.calibrated_on != each.judged_on for one in found for each in one.coverage)
     blocks += [
-        Block(table=_coverage_table(one.forecaster, each), fold=each.by != "commanded")
+        Block(
+            table=_coverage_table(one.forecaster, each),
+            fold=each.by != "commanded" or (crossed and each.calibrated_on == each.judged_on),
+        )
         for one in found
         for each in one.coverage
     ]

@@ -15,7 +15,7 @@ from stylesim.report.tables import EM, Cell, Table, estimate_cell, grouped, numb
 
 DECIDED = (
     "Asked at the moment of the decision. Held: one of the modes does what the driver did (the rest is the miss of the "
-    "decision). Probability: of all modes that do it. Brier: (1 - that probability)², to be held against guessing, one "
+    "decision). Probability: of all modes that do it. Brier: (1 − that probability)², to be held against guessing, one "
     "probability for everybody. Who caused an event is left out."
 )
 WHAT = {

@@ -67,7 +67,10 @@ def save_stress(found: Sequence[Stress], page: str | Path, *, latencies: Mapping
 
 
 def _extra(found: Sequence[Stress]) -> list[Section]:
-    counts = [Block(table=facts_table(f"{one.forecaster}: what was asked", one.evaluation.counts)) for one in found]
+    first = found[0].evaluation.counts
+    alike = all(one.evaluation.counts == first for one in found)  # as it is with questions that all can answer
+    asked = {"Of every forecaster": first} if alike else {one.forecaster: one.evaluation.counts for one in found}
+    counts = [Block(table=facts_table(name, facts)) for name, facts in asked.items()]
     raw = json.dumps(dict(found[0].evaluation.about), indent=1, sort_keys=True)
     return [Section("asked", "What was asked", (), (*counts, Block(caption="About", raw=raw)))]
 

@@ -86,6 +86,7 @@ def test_degradation_is_the_difference_within_scenarios():
     found = {one.scenario: one.change["min_fde_m"] for one in degradation(both, seed=0)}
     assert {name: round(one.value, 9) for name, one in found.items()} == {"all": 2.0, "a": 1.0, "b": 3.0}
     assert (found["a"].n_drivers, found["a"].n_units, found["a"].status) == (60, 10, "general")
+    assert (found["all"].n_drivers, found["all"].n_units) == (120, 20)
 
 
 def test_too_few_drivers_of_one_population_are_refused_for_all():
