@@ -41,16 +41,16 @@ def project(
     line = line_m.astype(np.float64)
     a, ab = line[:-1], np.diff(line, axis=0)
     length = np.hypot(ab[:, 0], ab[:, 1])
-    ap = points_m.astype(np.float64)[:, None, :] - a[None]
-    t = np.clip((ap * ab).sum(-1) / np.maximum(length**2, 1e-12), 0.0, 1.0)
-    gap = ap - t[..., None] * ab
-    squared = (gap**2).sum(-1)
+    points = points_m.astype(np.float64)  # x and y apart: a sum over an axis of two costs four times as much
+    apx, apy = points[:, :1] - a[:, 0], points[:, 1:] - a[:, 1]
+    t = np.clip((apx * ab[:, 0] + apy * ab[:, 1]) / np.maximum(length**2, 1e-12), 0.0, 1.0)
+    squared = (apx - t * ab[:, 0]) ** 2 + (apy - t * ab[:, 1]) ** 2
     segment = squared.argmin(axis=1)
     row = np.arange(len(segment))
     start = np.concatenate([[0.0], np.cumsum(length)])[:-1]
     along = start[segment] + t[row, segment] * length[segment]
     distance = np.sqrt(squared[row, segment])
-    cross = ab[segment, 0] * ap[row, segment, 1] - ab[segment, 1] * ap[row, segment, 0]
+    cross = ab[segment, 0] * apy[row, segment] - ab[segment, 1] * apx[row, segment]
     offset = cross / np.maximum(length[segment], 1e-12)
     return along, offset, distance, segment
 

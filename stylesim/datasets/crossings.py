@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Any
+from typing import Any, no_type_check
 
 import numpy as np
-from jaxtyping import Bool, Float64
+from jaxtyping import Float64
+from numba import njit
 
 MIN_ANGLE_RAD = np.deg2rad(20.0)  # chosen: lanes that merge or split meet at less
 MAX_POINTS = 30  # per lane; chosen: a lane of 100 m then has a point every 3.4 m
@@ -17,23 +18,12 @@ _EPS = 1e-3  # a crossing this close to the end of a segment is counted with the
 def crossing(lines: Mapping[str, Any]) -> set[str]:
     """The ids of lines ([point, 2], or [point, 3] with heights) that cross another one at an angle, at its height."""
     thinned = {key: _thinned(np.asarray(line, np.float64)) for key, line in lines.items() if len(line) >= 2}
-    keys = list(thinned)
-    low = np.array([line[:, :2].min(axis=0) for line in thinned.values()]).reshape(-1, 2)
-    high = np.array([line[:, :2].max(axis=0) for line in thinned.values()]).reshape(-1, 2)
-    segments = {key: np.concatenate([line[:-1], line[1:]], axis=1) for key, line in thinned.items()}
-    found: set[str] = set()
-    for i, key in enumerate(keys[:-1]):
-        touch = (low[i + 1 :] <= high[i]).all(axis=1) & (high[i + 1 :] >= low[i]).all(axis=1)
-        near = [keys[i + 1 + j] for j in np.flatnonzero(touch)]
-        if not near:
-            continue
-        others = np.concatenate([segments[other] for other in near])
-        owner = np.repeat(np.arange(len(near)), [len(segments[other]) for other in near])
-        hit = _cross(segments[key], others).any(axis=0)
-        if hit.any():
-            found.add(key)
-            found.update(near[j] for j in np.unique(owner[hit]))
-    return found
+    if not thinned:
+        return set()
+    points = np.concatenate(list(thinned.values()))
+    bounds = np.concatenate([[0], np.cumsum([len(line) for line in thinned.values()])])
+    found = _crossed(points, bounds, float(np.sin(MIN_ANGLE_RAD)), CLEARANCE_M)
+    return {key for key, crossed in zip(thinned, found, strict=True) if crossed}
 
 
 def _thinned(line: Float64[np.ndarray, "point _"]) -> Float64[np.ndarray, "kept 3"]:
@@ -42,17 +32,43 @@ def _thinned(line: Float64[np.ndarray, "point _"]) -> Float64[np.ndarray, "kept 
     return np.stack([line[at, 0], line[at, 1], height], -1)
 
 
-def _cross(one: Float64[np.ndarray, "a 6"], other: Float64[np.ndarray, "b 6"]) -> Bool[np.ndarray, "a b"]:
-    """Which segments (x, y, z of both ends) cross."""
-    p, q = one[:, None, :2], other[None, :, :2]
-    r, s = one[:, None, 3:5] - p, other[None, :, 3:5] - q
-    cross = r[..., 0] * s[..., 1] - r[..., 1] * s[..., 0]
-    gap = q - p
-    with np.errstate(divide="ignore", invalid="ignore"):
-        t = (gap[..., 0] * s[..., 1] - gap[..., 1] * s[..., 0]) / cross
-        u = (gap[..., 0] * r[..., 1] - gap[..., 1] * r[..., 0]) / cross
-    lengths = np.hypot(r[..., 0], r[..., 1]) * np.hypot(s[..., 0], s[..., 1])
-    inside = (t > _EPS) & (t < 1 - _EPS) & (u > _EPS) & (u < 1 - _EPS)
-    steep = np.abs(cross) > np.sin(MIN_ANGLE_RAD) * lengths
-    apart = np.abs((one[:, None, 2] + one[:, None, 5]) - (other[None, :, 2] + other[None, :, 5])) / 2
-    return inside & steep & (apart < CLEARANCE_M)
+@njit(cache=True, nogil=True, error_model="numpy")
+@no_type_check
+def _crossed(points, bounds, sine, clearance):
+    """Which lines cross another one; line i has the points (x, y, z) bounds[i] to bounds[i + 1]."""
+    n = len(bounds) - 1
+    crossed = np.zeros(n, np.bool_)
+    low, high = np.empty((n, 2)), np.empty((n, 2))
+    for i in range(n):
+        for axis in range(2):
+            low[i, axis] = points[bounds[i] : bounds[i + 1], axis].min()
+            high[i, axis] = points[bounds[i] : bounds[i + 1], axis].max()
+    for i in range(n):
+        for j in range(i + 1, n):
+            if crossed[i] and crossed[j]:
+                continue
+            if low[j, 0] > high[i, 0] or low[j, 1] > high[i, 1] or high[j, 0] < low[i, 0] or high[j, 1] < low[i, 1]:
+                continue
+            if _meet(points, bounds[i], bounds[i + 1] - 1, bounds[j], bounds[j + 1] - 1, sine, clearance):
+                crossed[i] = crossed[j] = True
+    return crossed
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+@no_type_check
+def _meet(points, a, a_end, b, b_end, sine, clearance):
+    """Whether a segment of one line crosses a segment of the other."""
+    for i in range(a, a_end):
+        px, py = points[i, 0], points[i, 1]
+        rx, ry = points[i + 1, 0] - px, points[i + 1, 1] - py
+        for j in range(b, b_end):
+            gx, gy = points[j, 0] - px, points[j, 1] - py
+            sx, sy = points[j + 1, 0] - points[j, 0], points[j + 1, 1] - points[j, 1]
+            cross = rx * sy - ry * sx
+            t, u = (gx * sy - gy * sx) / cross, (gx * ry - gy * rx) / cross
+            if not (_EPS < t < 1 - _EPS and _EPS < u < 1 - _EPS):
+                continue
+            apart = abs((points[i, 2] + points[i + 1, 2]) - (points[j, 2] + points[j + 1, 2])) / 2
+            if apart < clearance and abs(cross) > sine * (np.hypot(rx, ry) * np.hypot(sx, sy)):
+                return True
+    return False

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
-from jaxtyping import Float, Float32, Float64
+from jaxtyping import Float, Float32, Float64, Int64
 
 from stylesim.geometry import project
 
@@ -19,15 +21,34 @@ def map_line(points: Any, origin_m: Float64[np.ndarray, " 2"]) -> Float32[np.nda
 
     ValueError where a point is not finite or too far away.
     """
-    array = np.asarray(points, np.float64)
-    if array.ndim != 2 or array.shape[1] < 2:
-        raise ValueError(f"a line has the shape {array.shape}, not (points, 2 or 3)")
-    array = array[:, :2] - origin_m
-    if not (np.abs(array) <= MAX_MAP_M).all():  # not-a-number fails too
+    return map_lines([points], origin_m)[0]
+
+
+def map_lines(lines: Sequence[Any], origin_m: Float64[np.ndarray, " 2"]) -> list[Float32[np.ndarray, "_ 2"]]:
+    """`map_line` of each: a map has hundreds of lines of a few points, so they are checked in one array."""
+    arrays = [np.asarray(points, np.float64) for points in lines]
+    for array in arrays:
+        if array.ndim != 2 or array.shape[1] < 2:
+            raise ValueError(f"a line has the shape {array.shape}, not (points, 2 or 3)")
+    if not arrays:
+        return []
+    every = np.concatenate([array[:, :2] for array in arrays]) - origin_m
+    if not (np.abs(every) <= MAX_MAP_M).all():  # not-a-number fails too
         raise ValueError("a point of the map is not finite or too far away")
-    apart = np.ones(len(array), bool)
-    apart[1:] = np.hypot(*np.diff(array, axis=0).T) > 1e-6
-    return array[apart].astype(np.float32)
+    return distinct_points(every, np.repeat(np.arange(len(arrays)), [len(array) for array in arrays]), len(arrays))
+
+
+def distinct_points(
+    points_m: Float64[np.ndarray, "point 2"], line: Int64[np.ndarray, " point"], n_lines: int
+) -> list[Float32[np.ndarray, "_ 2"]]:
+    """The points of each line, repeated ones left out, as read-only arrays; `line` says whose a point is, ascending."""
+    apart = np.ones(len(points_m), bool)
+    step = np.diff(points_m, axis=0)
+    apart[1:] = (np.hypot(step[:, 0], step[:, 1]) > 1e-6) | (line[1:] != line[:-1])
+    kept = points_m[apart].astype(np.float32)
+    kept.flags.writeable = False
+    bounds = np.searchsorted(line[apart], np.arange(n_lines + 1)).tolist()
+    return [kept[a:b] for a, b in pairwise(bounds)]
 
 
 def stop_line_at(

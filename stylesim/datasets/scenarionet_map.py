@@ -7,9 +7,10 @@ from typing import Any
 
 import numpy as np
 
+from stylesim.datasets.boundaries import Stretch
 from stylesim.datasets.guarding import mapping
 from stylesim.datasets.light_states import light_state
-from stylesim.datasets.polyline_map import MPH, PolylineLane, PolylineMap, Stretch
+from stylesim.datasets.polyline_map import MPH, PolylineLane, PolylineMap
 from stylesim.signals import Signals
 
 LANES = ("LANE_SURFACE_STREET", "LANE_FREEWAY")  # not LANE_BIKE_LANE, nor areas without a centre line

@@ -13,7 +13,8 @@ from typing import Any
 import numpy as np
 from jaxtyping import Int64
 
-VARINT, FIXED64, BYTES, FIXED32 = 0, 1, 2, 5
+from stylesim.datasets.wire_scan import BYTES, FIXED32, FIXED64, SCAN_ERRORS, VARINT, scanned
+
 Span = tuple[int, int]
 Fields = dict[int, list[Any]]  # field number -> ints (varint) or spans (everything else), in the order of the file
 
@@ -61,6 +62,25 @@ def fields(data: bytes, span: Span) -> Fields:
             raise WireError("a field is cut off")
         found.setdefault(key >> 3, []).append(value)
     return found
+
+
+def split(data: bytes, span: Span, number: int) -> tuple[Fields, Int64[np.ndarray, "item 2"]]:
+    """The fields of a message that repeats one field of bytes by the hundred: (all others, that one's spans).
+
+    WireError as `fields`, and where field `number` is something else.
+    """
+    keys, first, second = scanned(np.frombuffer(data, np.uint8), span[0], span[1])
+    if len(keys) and keys[-1] < 0:
+        raise WireError(SCAN_ERRORS[keys[-1]])
+    repeated = keys == number << 3 | BYTES
+    rest: Fields = {}
+    for key, begin, end in zip(*(part[~repeated].tolist() for part in (keys, first, second)), strict=True):
+        rest.setdefault(key >> 3, []).append(begin if key & 7 == VARINT else (begin, end))
+    if number in rest:
+        raise WireError(f"field {number} is of another type")
+    found = np.empty((int(repeated.sum()), 2), np.int64)
+    found[:, 0], found[:, 1] = first[repeated], second[repeated]
+    return rest, found
 
 
 def spans(message: Fields, number: int) -> list[Span]:
@@ -133,7 +153,9 @@ def packed_varints(packed: bytes) -> Int64[np.ndarray, " value"]:
     return values.view(np.int64)
 
 
-def fixed(data: bytes, found: Sequence[Span], layout: np.dtype[Any]) -> tuple[np.ndarray, np.ndarray]:
+def fixed(
+    data: bytes, found: Sequence[Span] | Int64[np.ndarray, "item 2"], layout: np.dtype[Any]
+) -> tuple[np.ndarray, np.ndarray]:
     """Messages that all have one layout of bytes, at once: (rows of `layout`, True for each span that has its size).
 
     A writer that puts every field, in order, gives messages of equal size; the caller checks the tags in the rows.

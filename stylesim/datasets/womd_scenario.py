@@ -6,6 +6,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from jaxtyping import Int64
 
 from stylesim.datasets import wire
 from stylesim.datasets.accounting import row_counts
@@ -36,6 +37,8 @@ _STATE = np.dtype(
     ]
 )
 _TAGS = (0x11, 0x19, 0x21, 0x2D, 0x35, 0x3D, 0x45, 0x4D, 0x55, 0x58)
+# Nearly all others: those who are not seen have a height, which is not read, and `valid`.
+_ABSENT = np.dtype([("z_tag", "u1"), ("z", "<f8"), ("valid_tag", "u1"), ("valid", "u1")])
 _VALUES = (*_DOUBLES, *_FLOATS, "valid")
 
 
@@ -87,19 +90,19 @@ def scene_of_scenario(data: bytes, message: wire.Fields, file: Path, split: str)
 def _tracks(data: bytes, found: list[wire.Span], n_frames: int) -> tuple[list[str], list[int], dict[str, np.ndarray]]:
     ids, kinds, where = [], [], []
     for span in found:
-        track = wire.fields(data, span)
-        states = wire.spans(track, 3)
+        track, states = wire.split(data, span, 3)
         if len(states) != n_frames:
             raise ValueError(f"a track has {len(states)} states for {n_frames} timestamps")
         ids.append(str(wire.integer(track, 1)))
         kinds.append(wire.integer(track, 2))
-        where.extend(states)
+        where.append(states)
     if len(set(ids)) != len(ids):
         raise ValueError("two tracks have one id")
-    return ids, kinds, {name: column.reshape(len(ids), n_frames) for name, column in _states(data, where).items()}
+    columns = _states(data, np.concatenate(where))
+    return ids, kinds, {name: column.reshape(len(ids), n_frames) for name, column in columns.items()}
 
 
-def _states(data: bytes, where: list[wire.Span]) -> dict[str, np.ndarray]:
+def _states(data: bytes, where: Int64[np.ndarray, "state 2"]) -> dict[str, np.ndarray]:
     """Every state's values, one column each; NaN where a field is missing."""
     rows, same = wire.fixed(data, where, _STATE)
     regular = np.ones(len(rows), bool)
@@ -109,8 +112,11 @@ def _states(data: bytes, where: list[wire.Span]) -> dict[str, np.ndarray]:
     values = {name: np.full(len(where), np.nan) for name in _VALUES}
     for name in _VALUES:
         values[name][same] = rows[name][regular]
-    for i in np.flatnonzero(~same).tolist():
-        state = wire.fields(data, where[i])
+    absent, short = wire.fixed(data, where, _ABSENT)
+    short[short] = (absent["z_tag"] == _TAGS[2]) & (absent["valid_tag"] == _TAGS[-1]) & (absent["valid"] == 0)
+    values["valid"][short] = 0
+    for i in np.flatnonzero(~(same | short)).tolist():
+        state = wire.fields(data, (int(where[i, 0]), int(where[i, 1])))
         values["valid"][i] = wire.integer(state, 11)
         if not values["valid"][i]:
             continue  # nothing is read from what is not valid
