@@ -2,6 +2,7 @@
 
     python -m benchmarks.human_limits [--scenarios motorway lane_drop …] [--episodes 4] [--seed 31] [--workers 1]
     python -m benchmarks.human_limits --corpus runs/sim
+    python -m benchmarks.human_limits --scenarios highway hw_exit --stressor hard_brake,cut_in,deer
 
 From unsmoothed 0.1 s states as logged (differences of the logged velocity along and across the heading): quantiles of
 the longitudinal acceleration, outside and within emergencies (a driver's frames from 2 s before to 2 s after one beyond
@@ -9,6 +10,9 @@ the longitudinal acceleration, outside and within emergencies (a driver's frames
 the one that moved over, or the one that ran red (`evaluation.collisions`), per 1,000 vehicle-km with the Poisson
 interval (Garwood). Targets beside: |a| <= 8 in an emergency and <= 4.5 otherwise, |jerk| <= 15 at the 99.9th
 percentile, lateral <= 4 m/s2; no collision of careful, cautious, timid drivers, <= 1 per 1,000 km of aggressive ones.
+
+With --stressor one more table, by kind of event: the one to whom it was done (its victim), in the 10 s from the event
+on. Who caused it is not in it: it does not drive like people.
 """
 
 from __future__ import annotations
@@ -25,6 +29,7 @@ from stylesim.corpus import Corpus
 from stylesim.evaluation.collisions import collisions_of
 from stylesim.scene import Scene
 from stylesim.simulation.generate import generate
+from stylesim.simulation.plan import PLAIN, EpisodePlan, stressors_of
 from stylesim.style import STYLE_CLASSES
 
 SUMO = ("motorway", "lane_drop", "ramp_merge", "corridor", "yellow_light")
@@ -32,6 +37,7 @@ ORDINARY_MPS2, EMERGENCY_MPS2, JERK_MPS3, LATERAL_MPS2 = 4.5, 8.0, 15.0, 4.0
 AROUND_S = 2.0
 PERCENTILE = 99.9
 PER_KM = 1000.0
+AFTER_S = 10.0  # chosen: a hard brake and its wave have passed by then
 
 
 def motions(scene: Scene) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
@@ -113,26 +119,51 @@ def audit(corpus: Corpus) -> None:
     print(f"collisions of logged boxes by kind: {dict(how) or 'none'}")
 
 
+def audit_victims(corpus: Corpus) -> None:
+    """Print what the victims of each kind of stressor did."""
+    found: dict[str, list[tuple[np.ndarray, np.ndarray, np.ndarray]]] = defaultdict(list)
+    for scene in corpus:
+        along, across, jerk, _ = motions(scene)
+        for event in scene.metadata.get("events", ()):
+            if event["victim"] in scene.tracks.agent_id:
+                row, first = scene.tracks.agent_id.index(event["victim"]), round(event["time_s"] / scene.tracks.dt_s)
+                span = slice(first, first + round(AFTER_S / scene.tracks.dt_s))
+                found[event["kind"]].append((along[row, span], jerk[row, span], across[row, span]))
+    print(f"victims in the {AFTER_S:g} s from the event on: |a| <= 8, |jerk| <= 15, lateral <= 4; p{PERCENTILE} (max)")
+    for kind, victims in sorted(found.items()):
+        cells = []
+        for column in range(3):
+            value = np.abs(np.concatenate([one[column] for one in victims]))
+            value = value[np.isfinite(value)]
+            cells.append(f"{np.percentile(value, PERCENTILE):5.2f} ({value.max():5.2f})")
+        print(f"{kind:12s} {len(victims):4d} victims | |a| {cells[0]} | |jerk| {cells[1]} | lateral {cells[2]}")
+
+
 def main() -> None:
     """Read or generate a corpus, print the audit."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--corpus", type=Path)
     parser.add_argument("--scenarios", nargs="+", default=list(SUMO))
     parser.add_argument("--episodes", type=int, default=4)
+    parser.add_argument("--stressor", default="", help="kinds, as for `stylesim generate --stressor`")
     parser.add_argument("--seed", type=int, default=31)
     parser.add_argument("--workers", type=int, default=1)
     asked = parser.parse_args()
     if asked.corpus is not None:
         audit(Corpus(asked.corpus))
+        audit_victims(Corpus(asked.corpus))
         return
+    plan = EpisodePlan(stressors=stressors_of(asked.stressor)) if asked.stressor else PLAIN
     for name in asked.scenarios:
         with tempfile.TemporaryDirectory() as folder:
             out = Path(folder) / name
-            audit(
-                generate(
-                    name, "tdbm_spectrum", episodes=asked.episodes, seed=asked.seed, out=out, workers=asked.workers
-                )
-            )
+            corpus = generate(
+                name, "tdbm_spectrum", episodes=asked.episodes, seed=asked.seed, out=out, workers=asked.workers,
+                plan=plan,
+            )  # fmt: skip
+            audit(corpus)
+            if asked.stressor:
+                audit_victims(corpus)
 
 
 if __name__ == "__main__":
