@@ -22,6 +22,7 @@ from stylesim.errors import CorpusError
 from stylesim.geometry import wrap_angle
 from stylesim.tracks import Tracks
 
+# What one unit of a stored integer is; chosen: finer than any sensor or tracker resolves (docs/corpus_format.md).
 POSITION_M = 0.001
 VELOCITY_MPS = 0.01
 HEADING_RAD = 0.001

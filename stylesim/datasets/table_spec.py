@@ -99,5 +99,10 @@ def sidecar_of(table: Path) -> Path:
 
 
 def spec_from_file(path: Path) -> TableSpec:
-    """The spec in a YAML file; InputError naming file and field."""
+    """The spec in a YAML file; InputError naming file and field, or what to do where there is none."""
+    if not path.is_file():
+        raise InputError(
+            f"no such file: {path}; it says what the columns of the table mean. Write it, or give the meanings with "
+            "--map id=track,time=t,x=center_x,y=center_y,… (`stylesim describe table`)"
+        )
     return load_yaml(TableSpec, path).checked(path)

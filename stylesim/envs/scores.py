@@ -13,7 +13,7 @@ from jaxtyping import Float64
 from stylesim.envs.policies import policy
 from stylesim.envs.registration import register
 
-RESAMPLES = 2000
+RESAMPLES = 2000  # chosen: a percentile of 2.5 % then rests on 50 resamples
 MEASURES = ("return", "cost", "collision", "red", "speed_mps", "length_s")
 
 

@@ -15,7 +15,7 @@ from stylesim.signals import SignalState
 from stylesim.simulation.sumo.episode import DT_S
 from stylesim.simulation.sumo.takeover import onward
 
-STANDING_MPS = 0.05
+STANDING_MPS = 0.05  # chosen: half a centimetre per step of 0.1 s is no motion
 NEAR_M = 1.0  # chosen: SUMO's distances along a lane and what was driven may differ by that much
 
 

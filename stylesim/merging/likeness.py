@@ -26,7 +26,7 @@ KEPT_OF = 8  # one word in eight
 LEAST_WORDS = 10  # fewer say nothing about a scene; chosen: ten are a minute of one vehicle
 # Rounding loses about a tenth of the words of a true copy, and other tracks may have been cut; chosen.
 DUPLICATE_SHARE = 0.6
-OVERLAP_SHARE = 0.05
+OVERLAP_SHARE = 0.05  # chosen: scenes that share less than a twentieth are not reported as alike
 MOST_HOLDERS = 50  # a word that so many scenes have is a habit of a simulator, not an event; chosen
 
 Key = TypeVar("Key", bound=Hashable)

@@ -17,7 +17,7 @@ from stylesim import errors
 from stylesim.errors import SimulationError, StylesimError
 from stylesim.simulation.workers import Job, Task
 
-ATTEMPTS = 2
+ATTEMPTS = 2  # chosen: a worker may die of something else than its episode (memory, a signal) once
 PATIENCE_S = 5.0  # how long a worker may take to close its simulation
 POLL_S = 0.5  # a wait without end could not be interrupted by Ctrl-C everywhere
 ENVIRONMENT = {"POLARS_MAX_THREADS": "1", "OMP_NUM_THREADS": "1", "NUMBA_NUM_THREADS": "1", "PYTHONHASHSEED": "0"}

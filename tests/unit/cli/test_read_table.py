@@ -23,6 +23,14 @@ def test_a_table_in_feet(tmp_path):
     assert abs(scene.tracks.position_m[1, 50, 0] - own[50].x) < 1e-3
 
 
+def test_a_table_without_meanings_says_how_to_give_them(tmp_path):
+    (tmp_path / "tracks.csv").write_text("track,t,px,py\n")
+    result = run("read", "table", tmp_path / "tracks.csv", "--out", tmp_path / "c")
+    assert result.exit_code != 0
+    assert "--map id=" in str(result.exception)
+    assert [path.name for path in tmp_path.iterdir()] == ["tracks.csv"]
+
+
 def test_mdsi_by_name(tmp_path):
     study_files.sample(tmp_path / "study")
     assert run("read", "auto", tmp_path / "study", "--out", tmp_path / "c").exit_code == 0
