@@ -17,6 +17,7 @@ from xml.etree.ElementTree import Element
 import numpy as np
 import polars as pl
 
+from stylesim.collecting import no_collection
 from stylesim.datasets.commonroad_map import points, read_road
 from stylesim.datasets.commonroad_states import State, without_trajectories
 from stylesim.datasets.cutting import cut
@@ -87,7 +88,7 @@ def sniff(path: Path) -> bool:
 
 
 def _scenes(file: Path) -> Iterator[Scene]:
-    with reading(file, "scenario of CommonRoad"):
+    with reading(file, "scenario of CommonRoad"), no_collection():
         raw, trajectories = without_trajectories(unchecked_bytes(file))
     root = tree(raw, file, root="commonRoad")
     version = root.get("commonRoadVersion", "")
@@ -98,7 +99,8 @@ def _scenes(file: Path) -> Iterator[Scene]:
         if not 0.005 <= dt_s <= 2.0:
             raise InputError(f"{file}: timeStepSize is {root.get('timeStepSize')!r}; expected seconds, 0.005 to 2")
         name = (root.get("benchmarkID") or file.stem)[:200]
-        table, dropped = _table(root, file, trajectories)
+        with no_collection():
+            table, dropped = _table(root, file, trajectories)
         recording, origin = recording_of(table, Source(file, f"{SOURCE}_{name}", dt_s, dropped))
         site = read_road(root, origin)
         log = _lights(root, site, int(recording.frame.max(initial=0)) + 1, dt_s)

@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import no_type_check
 
 import numpy as np
-from jaxtyping import Bool, Float, Float64, Int64
+from jaxtyping import Bool, Float64
+from numba import njit
 
 from stylesim.geometry import arc_length
 
@@ -13,6 +15,7 @@ STATION_M = 1.0  # chosen: at a turning radius of 8 m the chord is 2 cm off the 
 MAX_STATIONS = 2000  # chosen: bounds what a damaged file can ask for; 2 km of one lane are still every metre
 MIN_CROSSING_RAD = np.deg2rad(15.0)  # chosen: lanes that merge or split do so at less, lanes that cross at more
 SAME_POINT_M = 1e-3
+_ENDS = 0.02  # chosen: 2 % of a line's length are its ends
 
 
 def distinct(line_m: Float64[np.ndarray, "point 2"]) -> Float64[np.ndarray, "kept 2"]:
@@ -64,42 +67,46 @@ def between(
 
 def crossed(lines_m: Sequence[Float64[np.ndarray, "_ 2"]]) -> Bool[np.ndarray, " line"]:
     """True for the lines that cross another one at more than MIN_CROSSING_RAD, elsewhere than at their ends."""
-    hit = np.zeros(len(lines_m), bool)
+    if not lines_m:
+        return np.zeros(0, bool)
     coarse = [evenly(line, max(2, min(len(line), 50))) for line in lines_m]
-    low = np.array([line.min(axis=0) for line in coarse]).reshape(-1, 2)
-    high = np.array([line.max(axis=0) for line in coarse]).reshape(-1, 2)
-    for i, line in enumerate(coarse):
-        near = ((low <= high[i]) & (high >= low[i])).all(axis=1)
-        for j in np.flatnonzero(near).tolist():
-            if j > i and not (hit[i] and hit[j]) and _cross(line, coarse[j]):
+    bounds = np.concatenate([[0], np.cumsum([len(line) for line in coarse])])
+    low, high = np.array([line.min(axis=0) for line in coarse]), np.array([line.max(axis=0) for line in coarse])
+    return np.asarray(_crossed(np.concatenate(coarse), bounds, low, high, float(np.sin(MIN_CROSSING_RAD))))
+
+
+@njit(cache=True, nogil=True)
+@no_type_check
+def _crossed(points, bounds, low, high, sine):
+    """Which lines cross another one; line i has the points bounds[i] to bounds[i + 1], low and high are its box."""
+    n = len(low)
+    hit = np.zeros(n, np.bool_)
+    for i in range(n):
+        for j in range(i + 1, n):
+            if low[j, 0] > high[i, 0] or low[j, 1] > high[i, 1] or high[j, 0] < low[i, 0] or high[j, 1] < low[i, 1]:
+                continue
+            if not (hit[i] and hit[j]) and _cross(points, bounds[i : i + 2], bounds[j : j + 2], sine):
                 hit[i] = hit[j] = True
     return hit
 
 
-def _cross(one: Float[np.ndarray, "a 2"], other: Float[np.ndarray, "b 2"]) -> bool:
-    first, second = _reaching(one, other), _reaching(other, one)  # most segments of most pairs cannot meet
-    if not (len(first) and len(second)):
-        return False
-    p, r = one[first, None], (one[first + 1] - one[first])[:, None]
-    q, s = other[None, second], (other[second + 1] - other[second])[None]
-    cross = r[..., 0] * s[..., 1] - r[..., 1] * s[..., 0]
-    apart = q - p
-    with np.errstate(divide="ignore", invalid="ignore"):
-        t = (apart[..., 0] * s[..., 1] - apart[..., 1] * s[..., 0]) / cross
-        u = (apart[..., 0] * r[..., 1] - apart[..., 1] * r[..., 0]) / cross
-    meet = (t >= 0) & (t <= 1) & (u >= 0) & (u <= 1)
-    if not meet.any():
-        return False
-    sine = np.abs(cross) / np.maximum(np.hypot(r[..., 0], r[..., 1]) * np.hypot(s[..., 0], s[..., 1]), 1e-12)
-    meet &= sine > np.sin(MIN_CROSSING_RAD)
-    along = (first[:, None] + t) / (len(one) - 1)
-    across = (second[None] + u) / (len(other) - 1)
-    inner = (along > 0.02) & (along < 0.98) & (across > 0.02) & (across < 0.98)  # chosen: 2 % of the length are ends
-    return bool((meet & inner).any())
-
-
-def _reaching(one: Float[np.ndarray, "a 2"], other: Float[np.ndarray, "b 2"]) -> Int64[np.ndarray, " segment"]:
-    """The segments of one line whose boxes touch the box of the other, with a millimetre to spare for rounding."""
-    low, high = other.min(axis=0) - SAME_POINT_M, other.max(axis=0) + SAME_POINT_M
-    over, under = one >= low, one <= high
-    return np.flatnonzero(((over[:-1] | over[1:]) & (under[:-1] | under[1:])).all(axis=1))
+@njit(cache=True, nogil=True, error_model="numpy")
+@no_type_check
+def _cross(points, one, other, sine):
+    """Whether a segment of one line crosses a segment of the other."""
+    for i in range(one[0], one[1] - 1):
+        px, py = points[i, 0], points[i, 1]
+        rx, ry = points[i + 1, 0] - px, points[i + 1, 1] - py
+        for j in range(other[0], other[1] - 1):
+            gx, gy = points[j, 0] - px, points[j, 1] - py
+            sx, sy = points[j + 1, 0] - points[j, 0], points[j + 1, 1] - points[j, 1]
+            cross = rx * sy - ry * sx
+            t, u = (gx * sy - gy * sx) / cross, (gx * ry - gy * rx) / cross
+            if not (0.0 <= t <= 1.0 and 0.0 <= u <= 1.0):
+                continue
+            along = (i - one[0] + t) / (one[1] - one[0] - 1)
+            across = (j - other[0] + u) / (other[1] - other[0] - 1)
+            inner = _ENDS < along < 1 - _ENDS and _ENDS < across < 1 - _ENDS
+            if inner and abs(cross) > sine * max(np.hypot(rx, ry) * np.hypot(sx, sy), 1e-12):
+                return True
+    return False
