@@ -46,7 +46,10 @@ def _who(corpus: Corpus, labels: StyleLabels, scale: str) -> str:
     """Whose scale judged, and how many tracks of the corpus were not labelled."""
     left = sum(info.n_agents for info in corpus.info) - len(labels)
     judged = f"judged by the scale of {scale}; " if scale else ""
-    return f"{judged}{left} of {left + len(labels)} tracks are not labelled: no motor vehicles"
+    total = left + len(labels)
+    if left:
+        return f"{judged}{left} of {total} tracks are no motor vehicles and have no label"
+    return f"{judged}all {total} tracks are labelled"
 
 
 def _clamped(scaler: FeatureScaler, labels: StyleLabels) -> list[tuple[str, str, str]]:
