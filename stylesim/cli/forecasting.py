@@ -14,6 +14,7 @@ from stylesim.cli.console import Bar, progress_bar, say, show_table
 from stylesim.errors import InputError
 
 if TYPE_CHECKING:
+    from stylesim.forecasting.forecaster import TrainedForecaster
     from stylesim.report.evaluate import Report
     from stylesim.report.tables import Cell
 
@@ -68,7 +69,7 @@ def train(
         0.125, min=0.0, max=0.99, help="Share of samples whose style is hidden in training."
     ),
     dense: bool = typer.Option(False, help="Learn the futures of the agents around too, and look at them."),
-    epochs: int = typer.Option(20, min=1, help="At most this many epochs; stops early without progress."),
+    epochs: int = typer.Option(30, min=1, help="At most this many epochs; stops early without progress."),
     max_steps: int | None = typer.Option(None, min=1, help="At most this many batches, whatever the epochs."),
     patience: int = typer.Option(8, min=1, help="Epochs without a better validation minFDE before it stops."),
     batch_size: int = typer.Option(32, min=1, help="Samples per step."),
@@ -126,12 +127,16 @@ def train(
         )
     if model.sees_future:
         say(f"{model.name}: it is told what nobody can know at t0; for benchmarks only")
+    _show_curve(model)
+    say(f"{out}")
+
+
+def _show_curve(model: TrainedForecaster) -> None:
     rows = [
         (r["epoch"], f"{r['train_loss']:.3f}", f"{r['val_loss']:.3f}", f"{r['min_fde_m']:.2f}")
         for r in model.training_curve
     ]
     show_table("Training", ("epoch", "train loss", "val loss", "val minFDE (m)"), rows)
-    say(f"{out}")
 
 
 def evaluate(
