@@ -17,10 +17,10 @@ from stylesim.cli import (
     comparing,
     corpora,
     describing,
+    evaluating,
     examining,
     experimenting,
     exporting,
-    forecasting,
     generating,
     labelling,
     measuring,
@@ -28,6 +28,7 @@ from stylesim.cli import (
     replaying,
     safety,
     stressing,
+    training,
 )
 from stylesim.cli.console import err
 from stylesim.errors import StylesimError
@@ -72,7 +73,8 @@ for module in (
     safety,
     comparing,
     analyzing,
-    forecasting,
+    training,
+    evaluating,
     predicting,
     examining,
     experimenting,

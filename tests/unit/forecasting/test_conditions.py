@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 import torch
 
-from stylesim.cli.forecasting import Condition as Choice
+from stylesim.cli.training import Condition as Choice
 from stylesim.corpus import Corpus
 from stylesim.errors import InputError
 from stylesim.evaluation.evaluate import evaluate
