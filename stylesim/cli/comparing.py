@@ -53,7 +53,7 @@ def show_realism(found: Realism) -> None:
         show_table(f"Against {one.real}, matched", ("figure", "sim", "real", "ratio", "target", ""), rows)
         rows = [
             [s.style, f"{s.sim_drivers}/{s.real_drivers}",
-             *("too few" if s.matched is None else f"{s.matched[name]:.2f}" for name in QUANTITIES)]
+             *("too few" if s.matched is None else _text(s.matched[name]) for name in QUANTITIES)]
             for s in one.styles
         ]  # fmt: skip
         show_table(f"Matched distance to {one.real} per measured style", ("style", "sim/real", *QUANTITIES), rows)

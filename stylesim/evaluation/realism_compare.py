@@ -43,7 +43,7 @@ def compared(sim: Profile, real: Profile, *, seed: int, draws: int) -> Compariso
         within_unit=real.within_unit,
         quantities=quantities,
         ratios=(*_headways(whole, resamples), _acceleration(sim, real, rng, draws)),
-        styles=tuple(_style(sim, real, place) for place in range(len(STYLES))),
+        styles=tuple(_style(sim, real, place, rng, draws) for place in range(len(STYLES))),
         collisions=collision_rate(real),
     )
 
@@ -148,12 +148,28 @@ def _acceleration(sim: Profile, real: Profile, rng: np.random.Generator, draws: 
     return Ratio("acceleration RMS (m/s²)", *point, _spread(point[0] / point[1], drawn[:, 0] / drawn[:, 1]), RMS_WITHIN)
 
 
-def _style(sim: Profile, real: Profile, place: int) -> StyleDistance:
+def _style(sim: Profile, real: Profile, place: int, rng: np.random.Generator, draws: int) -> StyleDistance:
     counts = int(sim.drivers[:, place].sum()), int(real.drivers[:, place].sum())
     if min(counts) < MIN_DRIVERS:
         return StyleDistance(STYLES[place], *counts, None)
-    pair = sim.histogram[:, place].sum(axis=0), real.histogram[:, place].sum(axis=0)
-    matched = {name: both_distances(pair, k, one.width)[1] for k, (name, one) in enumerate(QUANTITIES.items())}
+    ours, theirs = sim.histogram[:, place], real.histogram[:, place]
+
+    def all_matched(pair: tuple[Cells, Cells]) -> list[float]:
+        return [both_distances(pair, k, one.width)[1] for k, one in enumerate(QUANTITIES.values())]
+
+    drawn = np.array(
+        [
+            all_matched(
+                (
+                    np.tensordot(_blocks(rng, len(ours)), ours, axes=1),
+                    np.tensordot(_blocks(rng, len(theirs)), theirs, axes=1),
+                )
+            )
+            for _ in range(draws)
+        ]
+    ).reshape(-1, len(QUANTITIES))
+    point = all_matched((ours.sum(axis=0), theirs.sum(axis=0)))
+    matched = {name: _spread(point[k], drawn[:, k]) for k, name in enumerate(QUANTITIES)}
     return StyleDistance(STYLES[place], *counts, matched)
 
 

@@ -12,7 +12,7 @@ from stylesim.evaluation.exposure import Rate
 from stylesim.evaluation.realism_profile import Profile
 
 FORMAT = "stylesim-realism"
-SCHEMA_VERSION = 1
+SCHEMA_VERSION = 2  # 2: distances per style have intervals
 
 
 @dataclass(frozen=True)
@@ -82,16 +82,16 @@ class Ratio:
 
 @dataclass(frozen=True)
 class StyleDistance:
-    """Matched Wasserstein-1 distances of one measured style; None where either side has under 30 drivers."""
+    """Matched Wasserstein-1 distances of one measured style, blocks resampled; None under 30 drivers on either side."""
 
     style: str
     sim_drivers: int
     real_drivers: int
-    matched: Mapping[str, float] | None
+    matched: Mapping[str, Spread] | None
 
     def to_dict(self) -> dict[str, Any]:
         """Plain JSON values."""
-        matched = None if self.matched is None else {k: _plain(v) for k, v in self.matched.items()}
+        matched = None if self.matched is None else {k: v.to_dict() for k, v in self.matched.items()}
         return {"style": self.style, "sim": self.sim_drivers, "real": self.real_drivers, "matched": matched}
 
 

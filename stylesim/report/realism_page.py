@@ -130,7 +130,7 @@ def _styles(one: Comparison) -> Table:
         size = Cell(style.style, f"{style.sim_drivers} / {style.real_drivers} drivers", "head")
         values = [Cell("too few", look="refused")] * len(QUANTITIES)
         if style.matched is not None:
-            values = [_side(style.matched[name]) for name in QUANTITIES]
+            values = [_spread(style.matched[name]) for name in QUANTITIES]
         rows.append((size, *values))
     heads = ("measured style", *(f"{q.title} ({q.unit})" for q in QUANTITIES.values()))
     return Table("Matched distance per measured style (simulation / recording)", heads, tuple(rows))

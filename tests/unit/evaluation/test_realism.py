@@ -100,6 +100,13 @@ def test_traffic_of_one_kind_is_as_far_apart_as_halves_of_it(folder):
             assert quantity.likelihood == pytest.approx(quantity.best_likelihood, rel=0.15)
     rms = one.ratios[-1]
     assert rms.met and rms.ratio.value == pytest.approx(1.0, abs=0.1)
+    told = [style for style in one.styles if style.matched is not None]
+    assert told and len(told) < len(one.styles)
+    for style in one.styles:
+        assert (style.matched is None) is (min(style.sim_drivers, style.real_drivers) < 30)
+    for style in told:
+        speed = style.matched["speed"]
+        assert 0.0 <= speed.low < speed.high and speed.value < speed.high
     json.dumps(found.to_dict(), allow_nan=False)
 
 
