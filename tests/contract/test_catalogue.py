@@ -19,7 +19,17 @@ from stylesim.simulation.replaying import replay
 
 KINDS = ("hard_brake", "cut_in", "jaywalker", "deer", "stalled", "red_runner")
 ONE_LANE = {"hw_two_way", "hw_roundabout", "roundabout", "intersection", "allway_stop", "priority"}  # no cut-in there
-NO_CROSSING = {"highway", "hw_merge", "hw_exit", "hw_two_way", "motorway", "ramp_merge", "lane_drop"}
+NO_CROSSING = {
+    "highway",
+    "hw_merge",
+    "hw_exit",
+    "hw_two_way",
+    "motorway",
+    "ramp_merge",
+    "lane_drop",
+    "roundabout",
+}  # SUMO's roundabout is a ring of edges that others join
+
 QUICK = ("hw_two_way",)  # the others in the slow run
 LOG_S, MOST_WARM_UP_S = 40.0, 25.0
 
