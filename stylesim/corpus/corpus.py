@@ -110,7 +110,8 @@ class Corpus:
 
     def __len__(self) -> int:
         """Number of scenes."""
-        return len(self.info)
+        whole = self._chosen is None and "info" not in self.__dict__  # else an object for each scene would be made
+        return int(self.manifest["n_scenes"]) if whole else len(self.info)
 
     def __iter__(self) -> Iterator[Scene]:
         return self.scenes()
