@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 import polars as pl
 
-from stylesim.exporting.base import Styles, Window, boundaries, cut, numbered, target_of, windows
+from stylesim.exporting.base import Names, Styles, Window, boundaries, cut, numbered, target_of, windows
 from stylesim.road import Lane, Road
 from stylesim.scene import Scene
 from stylesim.tracks import AgentKind, TrackFlag
@@ -37,6 +37,7 @@ class FormatWriter:
 
     def __init__(self, folder: Path) -> None:
         self._folder = folder
+        self._names = Names()
         self.counts: Counter[str] = Counter()
 
     def add(self, scene: Scene, styles: Styles) -> None:
@@ -46,9 +47,7 @@ class FormatWriter:
         else:
             found = windows(scene, length=FRAMES, t0=T0, counts=self.counts)
         for window in found:
-            name = PLAIN.sub("-", scene.source_scenario_id or scene.scene_id)
-            name = name if scene.t0_frame is not None else f"{name}-{window.number:03d}"
-            self._scenario(window, name, styles)
+            self._scenario(window, self._names.of(window, plain=PLAIN), styles)
 
     def _scenario(self, window: Window, name: str, styles: Styles) -> None:
         focal = target_of(window)

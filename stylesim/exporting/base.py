@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections import Counter
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
@@ -11,6 +12,7 @@ from typing import Protocol, runtime_checkable
 import numpy as np
 from jaxtyping import Float64
 
+from stylesim.errors import InputError
 from stylesim.road import Lane
 from stylesim.scene import Scene
 from stylesim.tracks import TrackFlag
@@ -72,6 +74,29 @@ def cut(scene: Scene, start: int, stop: int) -> Scene:
     signals = None if scene.signals is None else scene.signals.frames(start, stop)
     t0 = None if scene.t0_frame is None else scene.t0_frame - start
     return replace(scene, tracks=tracks.select(np.asarray(tracks.valid.any(axis=1))), signals=signals, t0_frame=t0)
+
+
+class Names:
+    """The names of scenarios in an export, each given once."""
+
+    def __init__(self) -> None:
+        self._given: set[str] = set()
+
+    def of(self, window: Window, *, plain: re.Pattern[str] | None = None) -> str:
+        """The source's own name of a scenario that it fixed, else the scene's and the window's number.
+
+        Scenes that were cut from one recording share the recording's name, so that is no name of a scenario. What
+        `plain` matches becomes "-". InputError where two names would be one.
+        """
+        scene = window.scene
+        own = f"{scene.scene_id}-{window.number:03d}"
+        wanted = (scene.source_scenario_id or scene.scene_id, own) if scene.t0_frame is not None else (own,)
+        for name in wanted:
+            name = name if plain is None else plain.sub("-", name)
+            if name not in self._given:
+                self._given.add(name)
+                return name
+        raise InputError(f"two scenarios would be named {name!r}; give the scenes ids that differ in their letters")
 
 
 def shift_m(scene: Scene) -> Float64[np.ndarray, " 2"]:

@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from stylesim.exporting.base import Styles, Window, boundaries, numbered, shift_m, target_of, windows
+from stylesim.exporting.base import Names, Styles, Window, boundaries, numbered, shift_m, target_of, windows
 from stylesim.exporting.womd import FRAMES, HEIGHT_M, STATES, T0
 from stylesim.scene import Scene
 from stylesim.signals import SignalState
@@ -32,6 +32,7 @@ class FormatWriter:
 
     def __init__(self, folder: Path) -> None:
         self._folder = folder
+        self._names = Names()
         self.counts: Counter[str] = Counter()
 
     def add(self, scene: Scene, styles: Styles) -> None:
@@ -41,8 +42,7 @@ class FormatWriter:
             if target is None:
                 self.counts["windows_without_a_track_to_predict"] += 1
                 continue
-            name = PLAIN.sub("-", scene.source_scenario_id or scene.scene_id)
-            name = name if scene.t0_frame is not None else f"{name}-{window.number:03d}"
+            name = self._names.of(window, plain=PLAIN)
             document = _document(window, name, target, styles, self.counts)
             (self._folder / f"tfrecord-{name}.json").write_text(json.dumps(document), encoding="utf-8")
             self.counts["written"] += 1

@@ -9,7 +9,7 @@ import numpy as np
 
 from stylesim.datasets.tfrecord import framed
 from stylesim.exporting import proto
-from stylesim.exporting.base import Styles, Window, boundaries, numbered, shift_m, target_of, windows
+from stylesim.exporting.base import Names, Styles, Window, boundaries, numbered, shift_m, target_of, windows
 from stylesim.road import Road
 from stylesim.scene import Scene
 from stylesim.signals import SignalState
@@ -38,6 +38,7 @@ class FormatWriter:
         self._file = (folder / FILE).open("wb")
         self._ids = (folder / "ids.csv").open("w", encoding="utf-8", newline="\n")
         self._columns: list[str] | None = None
+        self._names = Names()
         self.counts: Counter[str] = Counter()
 
     def add(self, scene: Scene, styles: Styles) -> None:
@@ -47,8 +48,7 @@ class FormatWriter:
             if target is None:
                 self.counts["windows_without_a_track_to_predict"] += 1
                 continue
-            name = scene.source_scenario_id or scene.scene_id
-            name = name if scene.t0_frame is not None else f"{name}-{window.number:03d}"
+            name = self._names.of(window)
             self._file.write(framed(scenario(window, name, target)))
             self._list_ids(window, name, styles)
             self.counts["written"] += 1

@@ -192,3 +192,29 @@ def test_a_long_scene_becomes_windows_and_the_rest_is_counted(tmp_path: Path) ->
     counts = export("av2", made, out=tmp_path / "out")
     assert counts["written"] == 2
     assert counts["frames_left_over"] == 30
+
+
+@pytest.mark.parametrize("name", sorted(EXPORTS))
+def test_no_scene_of_a_recording_that_was_cut_is_lost(tmp_path: Path, name: str) -> None:
+    with CorpusWriter(tmp_path / "cut", source="made", configuration={}) as writer:
+        for number in range(3):
+            scene = scene_with_everything(f"recording_{number:05d}", seed=number)
+            writer.add(replace(scene, source_scenario_id="recording"))
+        made = writer.finish()
+    assert export(name, made, out=tmp_path / "out")["written"] == 3
+    kept = FORMATS[name]
+    back = read(kept.reader, tmp_path / "out" / kept.folder, out=tmp_path / "back")
+    assert len(back) == 3
+
+
+@pytest.mark.parametrize("name", ["av2", "womd", "gpudrive"])
+def test_scenarios_of_one_name_in_two_sources_are_both_written(tmp_path: Path, name: str) -> None:
+    t0 = {"av2": 49, "womd": 10, "gpudrive": 10}[name]
+    with CorpusWriter(tmp_path / "two", source="made", configuration={}) as writer:
+        for number in range(2):
+            scene = scene_with_everything(f"source{number}_7", seed=number)
+            writer.add(replace(scene, source_scenario_id="7", t0_frame=t0))
+        made = writer.finish()
+    assert export(name, made, out=tmp_path / "out")["written"] == 2
+    back = read(FORMATS[name].reader, tmp_path / "out", out=tmp_path / "back")
+    assert len(back) == 2
