@@ -90,7 +90,7 @@ def tracks_of(document: Mapping[str, Any], file: Path) -> TrackArrays:
     if str(meta.get("dataset")) == "nuscenes":
         velocity, ahead = _from_key_frames(position, valid, is_ego)
         unknown = valid & np.isnan(velocity).any(-1)
-        dropped["no_velocity"] = int(unknown.sum())
+        dropped["velocity_unknown"] = int(unknown.sum())
         valid &= ~unknown
     arrays = {
         "agent_id": [str(key) for key in tracks],
