@@ -46,7 +46,6 @@ class FormatWriter:
             document = _document(window, name, target, styles, self.counts)
             (self._folder / f"tfrecord-{name}.json").write_text(json.dumps(document), encoding="utf-8")
             self.counts["written"] += 1
-            self.counts["agent_frames"] += int(window.scene.tracks.valid.sum())
 
     def finish(self) -> None:
         """Nothing stands once per data set."""
@@ -57,6 +56,7 @@ def _document(window: Window, name: str, target: int, styles: Styles, counts: Co
     shift = shift_m(scene)
     kept = [i for i in range(tracks.n_agents) if AgentKind(int(tracks.kind[i])) in TYPES]
     counts["agents_of_unknown_kinds"] += tracks.n_agents - len(kept)
+    counts["agent_frames"] += int(tracks.valid[kept].sum())
     place = {i: k for k, i in enumerate(kept)}
     ego = [i for i in np.flatnonzero(tracks.flagged(TrackFlag.EGO)).tolist() if i in place]
     focal = [i for i in np.flatnonzero(tracks.flagged(TrackFlag.FOCAL)).tolist() if i in place] or [target]

@@ -218,3 +218,16 @@ def test_scenarios_of_one_name_in_two_sources_are_both_written(tmp_path: Path, n
     assert export(name, made, out=tmp_path / "out")["written"] == 2
     back = read(FORMATS[name].reader, tmp_path / "out", out=tmp_path / "back")
     assert len(back) == 2
+
+
+def test_frames_of_kinds_that_gpudrive_does_not_know_are_not_counted_as_written(tmp_path: Path) -> None:
+    scene = scene_with_everything()
+    kind = scene.tracks.kind.copy()
+    kind[2] = AgentKind.OTHER
+    with CorpusWriter(tmp_path / "kinds", source="made", configuration={}) as writer:
+        writer.add(replace(scene, tracks=replace(scene.tracks, kind=kind)))
+        made = writer.finish()
+    counts = export("gpudrive", made, out=tmp_path / "out")
+    assert counts["agents_of_unknown_kinds"] == 1
+    back = read("gpudrive", tmp_path / "out", out=tmp_path / "back")
+    assert counts["agent_frames"] == back.manifest["n_steps"]
