@@ -86,7 +86,7 @@ def programme_of(
 
     Times are rounded to 0.1 s (the step); what the changes take off the cycle comes off the greens, each of
     which keeps at least 5 s. What has green in the next group, too, keeps it in between. Programmes of one episode
-    share their `offset_share` of the cycle; each begins `wave_m` / speed limit later than that.
+    share their `offset_share` of the cycle; each begins `wave_m` / speed limit and `wave_cycles` later than that.
     InputError if a movement is none of the junction's.
     """
     links = [link for link in network.links if link.signal == plan.junction]
@@ -102,7 +102,7 @@ def programme_of(
         if all_red > 0:
             phases.append((all_red, "".join("r" if end else a for a, end in zip(now, ends, strict=True))))
     cycle = sum(duration for duration, _ in phases)
-    delay = plan.wave_m / parameters["speed_limit_mps"]
+    delay = plan.wave_m / parameters["speed_limit_mps"] + plan.wave_cycles * cycle
     return Programme(plan.junction, round((offset_share * cycle + delay) % cycle, 1), tuple(phases))
 
 

@@ -78,9 +78,17 @@ def test_a_lane_shows_its_straight_movement() -> None:
     assert log.state[log.lane_id.index(("south_0",))].tolist() == [SignalState.RED, SignalState.GREEN]
 
 
-def test_the_green_wave_of_the_corridor_runs_at_the_speed_limit() -> None:
+def test_a_green_wave_runs_at_the_speed_limit() -> None:
+    plan = SignalPlan(junction="j", groups=(("west",), ("south",)), wave_m=500.0)
+    first, later = (programme_of(p, junction(), TIMES | {"speed_limit_mps": 16.0}, offset_share=0.0)
+                    for p in (plan.model_copy(update={"wave_m": 0.0}), plan))  # fmt: skip
+    assert (later.offset_s - first.offset_s) == pytest.approx(500.0 / 16.0 % sum(d for d, _ in later.phases), abs=0.11)
+
+
+def test_half_a_cycle_lies_between_the_signals_of_the_corridor() -> None:
     scenario = load_scenario("corridor").model_copy(update={"warm_up_s": 0.0, "duration_s": 170.0})
-    waves = {plan.junction: plan.wave_m for plan in sumo_options_of(scenario).signals}
+    waves = {plan.junction: plan.wave_cycles for plan in sumo_options_of(scenario).signals}
+    assert waves == {"one": 0.0, "two": 0.5, "three": 1.0}
     backend = SumoBackend()
     scene = backend.run_episode(scenario, Population.load("neutral"), seed=4, episode=0)
     backend.close()
@@ -91,9 +99,9 @@ def test_the_green_wave_of_the_corridor_runs_at_the_speed_limit() -> None:
         turned = np.flatnonzero((state[1:] == SignalState.GREEN) & (state[:-1] != SignalState.GREEN)) + 1
         begins[name] = turned * 0.1
     cycle = np.diff(begins["one"])[0]
-    for name, metres in waves.items():
-        late = (begins[name][0] - begins["one"][0]) % cycle
-        assert late == pytest.approx(metres / scene.parameters["speed_limit_mps"] % cycle, abs=0.15)
+    for name, cycles in waves.items():
+        late = (begins[name][0] - begins["one"][0] + 0.5) % cycle - 0.5
+        assert late == pytest.approx(cycles % 1.0 * cycle, abs=0.15)
 
 
 def test_every_light_of_a_network_is_logged_and_asks_drivers(tmp_path: Path) -> None:
