@@ -22,7 +22,7 @@ pytest.importorskip("libsumo", exc_type=ImportError)
 from stylesim.simulation.sumo import SumoBackend
 
 SPECTRUM = Population.load("tdbm_spectrum")
-YELLOW = load_scenario("yellow_light").model_copy(update={"warm_up_s": 25.0, "duration_s": 60.0})
+YELLOW = load_scenario("yellow_light").model_copy(update={"warm_up_s": 60.0, "duration_s": 90.0})
 RAMP = load_scenario("ramp_merge").model_copy(update={"warm_up_s": 25.0, "duration_s": 30.0})
 
 

@@ -54,7 +54,7 @@ def test_cache_is_keyed_by_content_and_holds_whole_files_only(tmp_path: Path, ch
     assert first.stat().st_mtime_ns == stamp
     assert compiled(scenario, 20.0) != first
     nodes = scenario.folder / "yellow_light.nod.xml"
-    nodes.write_text(nodes.read_text().replace('x="760"', 'x="770"'))
+    nodes.write_text(nodes.read_text().replace('x="1210"', 'x="1220"'))
     assert compiled(scenario) not in (first, None)
     assert {path.suffixes[-1] for path in (tmp_path / "cache" / "nets").iterdir()} == {".xml"}
 
