@@ -8,30 +8,25 @@ from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Any
 
-import torch
-
 from stylesim.corpus import Corpus
 from stylesim.errors import InputError, unknown
 from stylesim.forecasting.augmenting import Added, added_view
 from stylesim.forecasting.checkpoint import MODEL_FILE, RECORD_FILE, load, save
 from stylesim.forecasting.conditioner import Judges, StyleConditioner
 from stylesim.forecasting.conditions import CONDITIONS, model_name
-from stylesim.forecasting.config import VIEWS, InputConfig, ModelConfig, model_config
+from stylesim.forecasting.config import VIEWS, InputConfig, model_config
 from stylesim.forecasting.devices import runtime
 from stylesim.forecasting.forecaster import TrainedForecaster
 from stylesim.forecasting.loop import STATE_FILE, Loop, TrainSettings
 from stylesim.forecasting.mixing import MixedData, TrainingSet
-from stylesim.forecasting.model import ForecastNetwork
-from stylesim.forecasting.reweighting import group_report, identified, loss_weigher, with_groups
+from stylesim.forecasting.reweighting import group_report, with_groups
 from stylesim.forecasting.robust import RobustSettings
 from stylesim.forecasting.samples import SPLITS, Progress, compiled
 from stylesim.forecasting.styling import styled_data, with_styles
+from stylesim.forecasting.trained_loop import FIRST_FOLDER, trained_loop
 from stylesim.forecasting.training_folder import check_same, forgotten_if_refused, opened, write_json
-from stylesim.randomness import stream
 from stylesim.resources import cache_dir
 from stylesim.windows import WindowSpec
-
-FIRST_FOLDER = "identification"  # of the first model that JTT trains
 
 
 def train(
@@ -94,35 +89,42 @@ def train(
     robust = RobustSettings.of(robust)
     added = None if augment is None else added_view(corpus, augment, augment_share)
     out = Path(out)
-    record: dict[str, Any] = {"corpus": corpus.fingerprint, "condition": condition, "size": size, "fusion": fusion}
-    record |= {"reading": reading, "style_dropout": style_dropout, "dense": dense}
-    record |= {"spec": asdict(spec), "settings": asdict(settings)}
-    record |= {"robust": robust.to_dict(), "augment": None if added is None else added.to_dict()}
+    network = {"size": size, "fusion": fusion, "reading": reading, "style_dropout": style_dropout, "dense": dense}
+    record = _asked(corpus, condition, network, spec, settings, robust, added)
     if resume and (out / MODEL_FILE).exists():
         check_same(record, out)
         return load(out)
     place = runtime(accelerator, precision, compiled=compiled)
     folder = opened(out, record, resume=resume)
     watch = _Watch(stage, progress)
-    kept = cache or cache_dir()
     with forgotten_if_refused(folder):
         conditioner, data, groups = _training_set(
-            corpus, added, condition, spec, inputs, judges, robust, dense=dense, seed=seed, cache=kept, watch=watch
+            corpus, added, condition, spec, inputs, judges, robust, dense=dense, seed=seed, cache=cache, watch=watch
         )
     config = with_styles(config, conditioner)
-    if "jtt" in robust.methods:
-        first, told = _network(config, data, seed), watch.begin("identifying what is hard")
-        data = identified(data, first, settings, robust, runtime=place, folder=folder / FIRST_FOLDER, progress=told)
-    weigher = loss_weigher(robust, data, groups)
-    loop = Loop(_network(config, data, seed), data, settings, runtime=place, folder=folder, weigher=weigher)
-    loop.restore()
-    loop.run(watch.begin("training"))
+    loop = trained_loop(config, data, groups, settings, robust, runtime=place, folder=folder, begin=watch.begin)
     forecaster = TrainedForecaster(model_name(size, condition, fusion), loop.network, conditioner)
     save(forecaster, folder / MODEL_FILE)
-    write_json(folder / RECORD_FILE, {**record, **_outcome(loop), "groups": group_report(data, groups, weigher)})
+    report = group_report(loop.data, groups, loop.weigher)
+    write_json(folder / RECORD_FILE, {**record, **_outcome(loop), "groups": report})
     _close(folder, out)
     forecaster.training_curve = tuple(loop.curve)
     return forecaster
+
+
+def _asked(
+    corpus: Corpus,
+    condition: str,
+    network: dict[str, Any],
+    spec: WindowSpec,
+    settings: TrainSettings,
+    robust: RobustSettings,
+    added: Added | None,
+) -> dict[str, Any]:
+    """What was asked for, for the record and for `resume`."""
+    record = {"corpus": corpus.fingerprint, "condition": condition, **network}
+    record |= {"spec": asdict(spec), "settings": asdict(settings)}
+    return record | {"robust": robust.to_dict(), "augment": None if added is None else added.to_dict()}
 
 
 def _training_set(
@@ -136,27 +138,19 @@ def _training_set(
     *,
     dense: bool,
     seed: int,
-    cache: Path,
+    cache: Path | None,
     watch: _Watch,
 ) -> tuple[StyleConditioner | None, TrainingSet, tuple[str, ...]]:
     """What is fitted on the training split, all samples with their style, and the names of their groups."""
     corpora = [corpus] if added is None else [corpus, added.corpus]
-    stores = [compiled(c, spec, inputs, cache, progress=watch.begin("compiling samples")) for c in corpora]
+    kept = cache or cache_dir()
+    stores = [compiled(c, spec, inputs, kept, progress=watch.begin("compiling samples")) for c in corpora]
     conditioner, parts = styled_data(corpora, condition, spec, stores, inputs, judges, seed=seed, begin=watch.begin)
     parts = [replace(part, dense=dense) for part in parts]
     data: TrainingSet = parts[0] if added is None else MixedData(parts[0], parts[1], added.share)
     if not robust.grouped:
         return conditioner, data, ()
     return conditioner, *with_groups(data, corpora, robust)
-
-
-def _network(config: ModelConfig, data: TrainingSet, seed: int) -> ForecastNetwork:
-    """An untrained network with the intentions of the training samples."""
-    with torch.random.fork_rng():
-        torch.manual_seed(int(stream(seed, 0, "", "weights").integers(2**62)))
-        network = ForecastNetwork(config)
-    network.intention_mps2.copy_(torch.from_numpy(data.intentions(config.queries, seed=seed)))
-    return network
 
 
 def _outcome(loop: Loop) -> dict[str, Any]:

@@ -170,7 +170,7 @@ def test_jtt_draws_more_of_what_the_first_model_forecasts_worst(
         seen.append(before(*args, **more))
         return seen[-1]
 
-    monkeypatch.setattr("stylesim.forecasting.training.identified", watched)
+    monkeypatch.setattr("stylesim.forecasting.trained_loop.identified", watched)
     trained(corpus, tmp_path / "m", folder, robust=RobustSettings(("jtt",), jtt_share=0.25, jtt_weight=5.0))
     agent = seen[0].store.origin[seen[0].split(0), 2]
     hard = seen[0].sampling > 1
