@@ -76,7 +76,6 @@ def train(
 
     `accelerator` ("auto", "cpu", "gpu") and `precision` ("32-true", "bf16-mixed") say where and how it runs, `compiled`
     that torch compiles the network first; they are no part of what `resume` compares.
-
     `stage` is called with what begins (compiling, fitting, judging, training); `progress` then counts for it.
     """
     if condition not in CONDITIONS:
@@ -105,8 +104,7 @@ def train(
     loop = trained_loop(config, data, groups, settings, robust, runtime=place, folder=folder, begin=watch.begin)
     forecaster = TrainedForecaster(model_name(size, condition, fusion), loop.network, conditioner)
     save(forecaster, folder / MODEL_FILE)
-    report = group_report(loop.data, groups, loop.weigher)
-    write_json(folder / RECORD_FILE, {**record, **_outcome(loop), "groups": report})
+    write_json(folder / RECORD_FILE, {**record, **_outcome(loop, groups)})
     _close(folder, out)
     forecaster.training_curve = tuple(loop.curve)
     return forecaster
@@ -153,13 +151,15 @@ def _training_set(
     return conditioner, *with_groups(data, corpora, robust)
 
 
-def _outcome(loop: Loop) -> dict[str, Any]:
+def _outcome(loop: Loop, groups: tuple[str, ...]) -> dict[str, Any]:
     """What a training left behind, for the record."""
     counts = {split: len(loop.data.split(number)) for number, split in enumerate(SPLITS)}
     counts["train_without_weight"] = loop.data.without_weight
     counts["train_added"] = sum(len(part.split(0)) for part in loop.data.parts[1:])
     parameters = sum(p.numel() for p in loop.network.parameters())
-    return {"samples": counts, "parameters": parameters, "best_epoch": loop.best_epoch, "curve": loop.curve}
+    report = group_report(loop.data, groups, loop.weigher)
+    found = {"samples": counts, "parameters": parameters, "best_epoch": loop.best_epoch, "curve": loop.curve}
+    return {**found, "groups": report}
 
 
 def _close(folder: Path, out: Path) -> None:
