@@ -22,7 +22,7 @@ from typing import Any
 import torch
 
 from benchmarks.arms_table import print_table
-from benchmarks.worlds import arm_options, arms_of, folder_of, seeds_of, spec_of, told
+from benchmarks.worlds import arm_options, arms_of, folder_of, run, seeds_of, spec_of, told
 from stylesim.corpus import Corpus, CorpusWriter
 from stylesim.datasets.reading import read
 from stylesim.experiments.arms import Arm
@@ -143,4 +143,4 @@ def main() -> None:
 
 
 if __name__ == "__main__":
-    main()
+    run(main)

@@ -16,7 +16,7 @@ from typing import Any
 
 from benchmarks import dose_response
 from benchmarks.tables import estimate_text
-from benchmarks.worlds import SPEC, arm_options, arms_of, folder_of, seeds_of, simulated, spec_of, told
+from benchmarks.worlds import SPEC, arm_options, arms_of, folder_of, run, seeds_of, simulated, spec_of, told
 from stylesim.corpus import Corpus
 from stylesim.experiments.arms import Arm
 from stylesim.experiments.results import Experiment
@@ -111,4 +111,4 @@ def main() -> None:
 
 
 if __name__ == "__main__":
-    main()
+    run(main)

@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import argparse
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 from stylesim.corpus import Corpus
-from stylesim.errors import unknown
+from stylesim.errors import StylesimError, unknown
 from stylesim.experiments.arms import Arm
 from stylesim.labelers.labelling import label
 from stylesim.labelers.reference import default_labeler
@@ -105,3 +105,11 @@ if __name__ == "__main__":
     for crowd in ("tdbm_spectrum", "placebo"):
         found = simulated(asked.out, crowd)
         print(found.path, len(found), "scenes", {s: len(found.split(s)) for s in ("train", "val", "test")})
+
+
+def run(main: Callable[[], None]) -> None:
+    """`main`; what is wrong with the data is said in a sentence, as the command line of stylesim does."""
+    try:
+        main()
+    except StylesimError as error:
+        raise SystemExit(f"error: {error}") from None
