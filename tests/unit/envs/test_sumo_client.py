@@ -109,7 +109,7 @@ def test_the_ego_can_stop_run_red_and_collide() -> None:
     outcomes = {"stopped": False, "red": False, "collided": False}
     shipped = load_scenario("yellow_light")
     dense = shipped.parameters["demand_vph"].model_copy(update={"low": 2400.0, "high": 2800.0})  # somebody to hit
-    scenario = shipped.model_copy(update={"warm_up_s": 30.0, "parameters": shipped.parameters | {"demand_vph": dense}})
+    scenario = shipped.model_copy(update={"warm_up_s": 90.0, "parameters": shipped.parameters | {"demand_vph": dense}})
     world = SumoWorld(EnvConfig(entry="yellow", period_s=0.2, onset_tts_s=(4.5, 6.0)))
     for seed in range(12):
         world.reset(scenario=scenario, population=Population.load("naturalistic"), seed=seed)
