@@ -11,6 +11,7 @@ from stylesim.cli.console import err, progress_bar, say, show_table
 from stylesim.errors import InputError
 
 SHOWN_ERRORS = 20
+NOISE_TELLS = 0.6  # chosen: the lower end of an interval that lies clear of guessing (0.5)
 WAYS = "tdbm, kdsc, context (highway or not), tdbm+context, kdsc+context or source."
 
 
@@ -103,7 +104,18 @@ def merge(
         areas = [(name, *_area(found)) for name, found in tell.items()]
         heads = ("noise", "area under the ROC curve", "simulated, recorded drivers")
         show_table("Can noise alone tell simulated from recorded tracks? (0.5: no, 1: always)", heads, areas)
+        if noise_still_tells(tell["after"]):
+            say(
+                "noise still tells simulated from recorded tracks: what the model adds is not what that recording has. "
+                "A model trained on both may learn the difference (stylesim/merging/telltale.py says what was tried)"
+            )
     say(f"{out}")
+
+
+def noise_still_tells(found: dict[str, Any]) -> bool:
+    """Whether the area under the curve after noise was added lies clear of guessing."""
+    low = found.get("low")
+    return low is not None and low > NOISE_TELLS
 
 
 def _area(found: dict[str, Any]) -> tuple[str, str]:
