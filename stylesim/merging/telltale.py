@@ -7,11 +7,11 @@ manoeuvre are not among the features. 0.5 is what guessing gives; a gradient-boo
 whole drivers held out.
 
 What the noise model of this package reaches is printed by every merge that uses it. On DLR UT against SUMO it does not
-help (1.00 before and after), nor on INTERACTION (0.97 and 0.99) or NGSIM US-101 (1.00 and 1.00): those trackers' velocities are
-smoother than a simulated driver's pedal, and noise can only be added. Two things more were tried with 400 simulated drivers of
-`corridor` and did not help enough to be built: smoothing the simulated tracks first, which would need their future,
-which a history must not know (1.00, 0.96, 1.00 without noise, 1.00, 0.99, 1.00 with it), and residuals of recorded
-drivers in place of drawn noise on smoothed tracks (1.00, 0.98, 0.95).
+help (1.00 before and after), nor on INTERACTION (0.97, 0.99) or NGSIM US-101 (1.00, 1.00): the first two trackers'
+velocities are smoother than a simulated driver's pedal and noise can only be added, the third's errors differ from
+driver to driver. Tried with 400 drivers of `corridor` and not built, because it did not help enough: smoothing the
+simulated tracks first, which needs their future, which a history must not know (1.00, 0.96, 1.00 on the three; with
+noise 1.00, 0.99, 1.00), and recorded drivers' residuals on smoothed tracks in place of drawn noise (1.00, 0.98, 0.95).
 """
 
 from __future__ import annotations
