@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 
 import numpy as np
+from jaxtyping import Float64
 
 from stylesim.planners.answers import EgoControl, EgoTrajectory
 from stylesim.planners.bicycle import LENGTH_M, EgoState
@@ -28,16 +29,36 @@ def control_towards(trajectory: EgoTrajectory, state: EgoState) -> EgoControl:
     return EgoControl(pedal, steering_to(points, state))
 
 
-def steering_to(path_m: np.ndarray, state: EgoState) -> float:
-    """The steering angle that leads to the point of a path at the look-ahead distance; 0 for a path without length."""
-    reach = max(LEAST_AHEAD_M, LOOK_AHEAD_S * state.speed_mps)
-    away = np.hypot(path_m[:, 0] - state.x, path_m[:, 1] - state.y)
-    beyond = np.flatnonzero(away >= reach)
-    number = int(beyond[0]) if len(beyond) else int(np.argmax(away))
-    distance = float(away[number])
+def steering_to(path_m: Float64[np.ndarray, "point 2"], state: EgoState) -> float:
+    """The steering angle that leads to the point of a path at the look-ahead distance; 0 for a path without length.
+
+    The path begins beside the ego and leads on from there.
+    """
+    goal = _ahead(path_m, state, max(LEAST_AHEAD_M, LOOK_AHEAD_S * state.speed_mps))
+    distance = float(np.hypot(*goal))
     if distance < 0.1:
         return 0.0
-    angle = math.atan2(path_m[number, 1] - state.y, path_m[number, 0] - state.x) - state.heading_rad
+    angle = math.atan2(goal[1], goal[0]) - state.heading_rad
     curvature = 2.0 * math.sin(math.remainder(angle, 2.0 * math.pi)) / distance
     slip = math.asin(min(max(curvature * LENGTH_M / 2.0, -0.9), 0.9))
     return math.atan(2.0 * math.tan(slip))
+
+
+def _ahead(path_m: Float64[np.ndarray, "point 2"], state: EgoState, reach_m: float) -> Float64[np.ndarray, " 2"]:
+    """Where the path leaves the circle of that radius about the ego, seen from it; its farthest point if it does not.
+
+    Between the vertices, too: on a straight road the next one may be hundreds of metres away, and who aims at it
+    comes back to his lane so slowly that he drifts into another one.
+    """
+    seen = path_m - (state.x, state.y)
+    away = np.hypot(*seen.T)
+    beyond = np.flatnonzero(away >= reach_m)
+    if not len(beyond):
+        return np.asarray(seen[np.argmax(away)])
+    number = int(beyond[0])
+    if number == 0:
+        return np.asarray(seen[0])
+    start, piece = seen[number - 1], seen[number] - seen[number - 1]
+    # |start + share * piece| = reach_m has one root in [0, 1]: the piece begins inside of the circle and ends outside.
+    a, b, c = piece @ piece, start @ piece, start @ start - reach_m**2
+    return np.asarray(start + (math.sqrt(b * b - a * c) - b) / a * piece)

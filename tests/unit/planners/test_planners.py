@@ -190,7 +190,7 @@ def test_a_red_light_that_is_run_is_seen() -> None:
 
 
 def test_the_baseline_follows_its_lane_and_stops_for_red() -> None:
-    scenario = load_scenario("yellow_light").model_copy(update={"warm_up_s": 40.0, "duration_s": 45.0})
+    scenario = load_scenario("yellow_light").model_copy(update={"warm_up_s": 40.0, "duration_s": 110.0})
     backend = open_backend("sumo")
     plan = EpisodePlan(ego="stylesim.planners:IdmPlanner")
     stopped = red = hit = 0
