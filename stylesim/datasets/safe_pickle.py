@@ -10,6 +10,7 @@ from __future__ import annotations
 import io
 import pickle
 import pickletools
+import warnings
 from collections.abc import Callable
 from typing import Any
 
@@ -146,7 +147,12 @@ class _Unpickler(pickle.Unpickler):
 
 def loads(raw: bytes) -> Any:
     """The data in a pickle. UnsafePickleError, or what the unpickler raises, where it is damaged or hostile."""
-    _looked_through(raw)
+    with warnings.catch_warnings():
+        warnings.simplefilter("error", DeprecationWarning)  # Python's word for an escape that no pickle is written with
+        try:
+            _looked_through(raw)
+        except DeprecationWarning as warning:
+            raise UnsafePickleError(f"the pickle is damaged: {warning}") from None
     return _plain(_Unpickler(io.BytesIO(raw)).load(), {}, 0)
 
 

@@ -202,3 +202,9 @@ def test_real_scenarios(shared_data):
     assert len(waymo.signals.signal_id) == 8
     assert waymo.tracks.lookahead_steps is None
     assert found["scene-0061"].tracks.lookahead_steps.max() > 0
+
+
+def test_a_string_with_an_escape_that_no_pickle_has_is_refused_and_not_warned_of():
+    with pytest.raises(safe_pickle.UnsafePickleError, match="damaged: invalid escape"):
+        safe_pickle.loads(b"S'a\\qb'\n.")
+    assert safe_pickle.loads(b"S'a\\nb'\n.") == "a\nb"
