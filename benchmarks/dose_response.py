@@ -22,12 +22,11 @@ from typing import Any
 import torch
 
 from benchmarks.arms_table import print_table
-from benchmarks.worlds import arm_options, arms_of, folder_of, run, seeds_of, spec_of, told
+from benchmarks.worlds import arm_options, folder_of, run, trained
 from stylesim.corpus import Corpus, CorpusWriter
 from stylesim.datasets.reading import read
 from stylesim.experiments.arms import Arm
 from stylesim.experiments.results import Experiment
-from stylesim.experiments.running import run_experiment
 from stylesim.forecasting.robust import RobustSettings
 from stylesim.labelers.labelling import label
 from stylesim.labelers.reference import new_labeler
@@ -126,17 +125,7 @@ def main() -> None:
             synthetic(what.scenarios, crowd, asked.out / f"{name}-{crowd}", episodes=asked.episodes, plain=plain)
             for crowd in ("rare_heavy", "naturalistic")
         )
-        result = run_experiment(
-            arms_of(asked, arms(rare, usual, what.by)),
-            corpus=corpus,
-            seeds=seeds_of(asked),
-            steps=asked.steps,
-            size=asked.size,
-            spec=spec_of(asked, SPEC),
-            out=out,
-            cache=asked.out / "cache",
-            progress=told,
-        )
+        result = trained(asked, arms(rare, usual, what.by), corpus, out, spec=SPEC, cache=asked.out / "cache")
     units = {info.unit_id.split("/")[0] for info in corpus.info}
     print(f"{name}, {asked.size}, {asked.steps} steps; site(s): {', '.join(sorted(units))}")
     print_table(result, BASE, what.by, least_on_val=LEAST_ON_VAL, sites=len(units))

@@ -16,11 +16,10 @@ from typing import Any
 
 from benchmarks import dose_response
 from benchmarks.tables import estimate_text
-from benchmarks.worlds import SPEC, arm_options, arms_of, folder_of, run, seeds_of, simulated, spec_of, told
+from benchmarks.worlds import SPEC, arm_options, folder_of, run, simulated, trained
 from stylesim.corpus import Corpus
 from stylesim.experiments.arms import Arm
 from stylesim.experiments.results import Experiment
-from stylesim.experiments.running import run_experiment
 from stylesim.labelers.labelling import label
 from stylesim.labelers.reference import new_labeler
 
@@ -97,16 +96,7 @@ def main() -> None:
             corpus = simulated(asked.out, "tdbm_spectrum")
         else:
             corpus = recorded(asked.corpus, asked.data, asked.out, method)
-        run_experiment(
-            arms_of(asked, list(arms(method).values())),
-            corpus=corpus,
-            seeds=seeds_of(asked),
-            steps=asked.steps,
-            out=out,
-            size=asked.size,
-            spec=spec_of(asked, SPEC if simulation else dose_response.SPEC),
-            progress=told,
-        )
+        trained(asked, list(arms(method).values()), corpus, out, spec=SPEC if simulation else dose_response.SPEC)
     show(Experiment.load(out), method)
 
 

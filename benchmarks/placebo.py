@@ -12,7 +12,7 @@ below 0 is a gain. Resumable: repeat the command; a second process may take othe
 from __future__ import annotations
 
 from benchmarks.tables import estimate_text
-from benchmarks.worlds import folder_of, options, seeds_of, simulated, spec_of, told
+from benchmarks.worlds import folder_of, options, run, seeds_of, simulated, spec_of, told
 from stylesim.experiments.placebo import CONTROL_WORLD, PLACEBO_WORLD, Placebo, placebo, placebo_of
 from stylesim.experiments.results import Experiment
 
@@ -58,4 +58,4 @@ def main() -> None:
 
 
 if __name__ == "__main__":
-    main()
+    run(main)

@@ -17,11 +17,10 @@ from pathlib import Path
 import torch
 
 from benchmarks.arms_table import print_table
-from benchmarks.worlds import arm_options, arms_of, folder_of, seeds_of, spec_of, told
+from benchmarks.worlds import arm_options, folder_of, run, trained
 from stylesim.corpus import Corpus
 from stylesim.experiments.arms import Arm
 from stylesim.experiments.results import Experiment
-from stylesim.experiments.running import run_experiment
 from stylesim.labelers.labelling import label
 from stylesim.labelers.reference import default_labeler
 from stylesim.merging.merge import merge
@@ -70,29 +69,18 @@ def main() -> None:
     asked = parser.parse_args()
     torch.set_num_threads(1)
     out = folder_of(asked, "rare_styles")
-    result = Experiment.load(out) if asked.show else run(asked, out)
+    result = Experiment.load(out) if asked.show else made_and_trained(asked, out)
     for by in ("commanded", "tdbm"):
         print_table(result, BASE, by)
 
 
-def run(asked: argparse.Namespace, out: Path) -> Experiment:
+def made_and_trained(asked: argparse.Namespace, out: Path) -> Experiment:
     """Make the corpora and train what is missing."""
     train = divided(made(asked.out, "everyday", "naturalistic", episodes=asked.episodes, seed=1), (0.85, 0.15, 0.0))
     judged = divided(made(asked.out, "judged", "tdbm_spectrum", episodes=5, seed=2), (0.1, 0.3, 0.6))
     added = made(asked.out, "rare", "rare_heavy", episodes=asked.episodes, seed=3)
-    return run_experiment(
-        arms_of(asked, arms(added)),
-        corpus=train,
-        test=judged,
-        seeds=seeds_of(asked),
-        steps=asked.steps,
-        size=asked.size,
-        spec=spec_of(asked, SPEC),
-        out=out,
-        cache=asked.out / "cache",
-        progress=told,
-    )
+    return trained(asked, arms(added), train, out, spec=SPEC, test=judged, cache=asked.out / "cache")
 
 
 if __name__ == "__main__":
-    main()
+    run(main)

@@ -18,11 +18,10 @@ Resumable: repeat the command; a second process may take other seeds (`--first-s
 from __future__ import annotations
 
 from benchmarks.tables import estimate_text
-from benchmarks.worlds import arm_options, arms_of, folder_of, seeds_of, simulated, spec_of, told
+from benchmarks.worlds import arm_options, folder_of, run, simulated, trained
 from stylesim.experiments.arms import Arm
 from stylesim.experiments.placebo import MARGIN
 from stylesim.experiments.results import Experiment
-from stylesim.experiments.running import run_experiment
 
 BY = "commanded"
 TOLD = {"tdbm": ("none", "features", "random"), "earlier": ("none", "features", "random", "earlier_features")}
@@ -73,18 +72,9 @@ def main() -> None:
     asked = arm_options(__doc__, seeds=5, steps=400).parse_args()
     out = folder_of(asked, "styles")
     if not asked.show:
-        run_experiment(
-            arms_of(asked, arms()),
-            corpus=simulated(asked.out, "tdbm_spectrum"),
-            seeds=seeds_of(asked),
-            steps=asked.steps,
-            out=out,
-            size=asked.size,
-            spec=spec_of(asked),
-            progress=told,
-        )
+        trained(asked, arms(), simulated(asked.out, "tdbm_spectrum"), out)
     show(Experiment.load(out))
 
 
 if __name__ == "__main__":
-    main()
+    run(main)

@@ -11,6 +11,8 @@ from typing import Any
 from stylesim.corpus import Corpus
 from stylesim.errors import StylesimError, unknown
 from stylesim.experiments.arms import Arm
+from stylesim.experiments.results import Experiment
+from stylesim.experiments.running import run_experiment
 from stylesim.labelers.labelling import label
 from stylesim.labelers.reference import default_labeler
 from stylesim.merging.merge import merge
@@ -100,11 +102,21 @@ def seeds_of(asked: argparse.Namespace) -> range:
     return range(asked.first_seed, asked.first_seed + asked.seeds)
 
 
-if __name__ == "__main__":
-    asked = options(__doc__, seeds=0, steps=0).parse_args()
-    for crowd in ("tdbm_spectrum", "placebo"):
-        found = simulated(asked.out, crowd)
-        print(found.path, len(found), "scenes", {s: len(found.split(s)) for s in ("train", "val", "test")})
+def trained(
+    asked: argparse.Namespace, arms: Sequence[Arm], corpus: Corpus, out: Path, *, spec: WindowSpec = SPEC, **more: Any
+) -> Experiment:
+    """The arms that the command line asks for, trained as it asks; `more` as of `run_experiment`."""
+    return run_experiment(
+        arms_of(asked, arms),
+        corpus=corpus,
+        seeds=seeds_of(asked),
+        steps=asked.steps,
+        size=asked.size,
+        spec=spec_of(asked, spec),
+        out=out,
+        progress=told,
+        **more,
+    )
 
 
 def run(main: Callable[[], None]) -> None:
@@ -113,3 +125,10 @@ def run(main: Callable[[], None]) -> None:
         main()
     except StylesimError as error:
         raise SystemExit(f"error: {error}") from None
+
+
+if __name__ == "__main__":
+    asked = options(__doc__, seeds=0, steps=0).parse_args()
+    for crowd in ("tdbm_spectrum", "placebo"):
+        found = simulated(asked.out, crowd)
+        print(found.path, len(found), "scenes", {s: len(found.split(s)) for s in ("train", "val", "test")})

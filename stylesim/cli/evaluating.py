@@ -43,7 +43,7 @@ def evaluate(
     from stylesim.corpus.files import new_folder
     from stylesim.evaluation.evaluate import common_spec
     from stylesim.forecast import horizon_s
-    from stylesim.forecasting.opening import open_forecaster
+    from stylesim.forecasting.opening import open_forecaster, training_split
     from stylesim.report.evaluate import evaluate as run
     from stylesim.report.tables import error_table
     from stylesim.windows import WindowSpec
@@ -57,9 +57,7 @@ def evaluate(
     corpus = Corpus(corpus_path)
     view = corpus if split == "all" else corpus.split(split)
     spec = WindowSpec(history, future, stride)
-    has_train = any(info.split == "train" for info in corpus.info)
-    train_split = (lambda: corpus.split("train")) if has_train else None
-    models = [open_forecaster(name, train=train_split, spec=spec) for name in names]
+    models = [open_forecaster(name, train=training_split(corpus), spec=spec) for name in names]
     judged = common_spec(models, spec)
     if judged.future_s < spec.future_s:
         shortest = min(models, key=horizon_s).name

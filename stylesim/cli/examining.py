@@ -97,12 +97,11 @@ def conformal(
     from stylesim.corpus.files import json_bytes, write_whole
     from stylesim.evaluation.conformal import conformal as run
     from stylesim.evaluation.results import interval_text
-    from stylesim.forecasting.opening import open_forecaster
+    from stylesim.forecasting.opening import open_forecaster, training_split
     from stylesim.windows import WindowSpec
 
     opened, spec = Corpus(corpus), WindowSpec(history, future, stride)
-    has_train = any(info.split == "train" for info in opened.info)
-    model = open_forecaster(forecaster, train=(lambda: opened.split("train")) if has_train else None, spec=spec)
+    model = open_forecaster(forecaster, train=training_split(opened), spec=spec)
     with progress_bar("forecasting", "scenes") as progress:
         report = run(
             model, opened, by=by, alpha=alpha, calibrate_on=calibrate_on, test_on=test_on, spec=spec, seed=seed,

@@ -25,15 +25,14 @@ def predict(
 ) -> None:
     """Forecast a corpus, as it is or as if everyone had another style; Parquet files that `evaluate` reads."""
     from stylesim.corpus import Corpus
-    from stylesim.forecasting.opening import open_forecaster
+    from stylesim.forecasting.opening import open_forecaster, training_split
     from stylesim.forecasting.predicting import predict as run
     from stylesim.windows import WindowSpec
 
     opened = Corpus(corpus)
     view = opened if split == "all" else opened.split(split)
-    has_train = any(info.split == "train" for info in opened.info)
     spec = WindowSpec(history, future, stride)
-    model = open_forecaster(forecaster, train=(lambda: opened.split("train")) if has_train else None, spec=spec)
+    model = open_forecaster(forecaster, train=training_split(opened), spec=spec)
     with progress_bar("forecasting", "scenes") as bar:
         files = run(model, view, out=out, styles=style, spec=spec, progress=bar)
     for path in files.values():

@@ -84,14 +84,13 @@ def stress(
 
 def _training(fit_on: Corpus | None, examined: Corpus | None) -> Callable[[], Iterable[Scene]] | None:
     """The scenes to fit on; None where the examined corpus would have to be its own training."""
+    from stylesim.forecasting.opening import training_split
+
     if fit_on is not None:
         if examined is not None and fit_on.fingerprint == examined.fingerprint:
             raise InputError("--fit-on and --corpus are one corpus: what is fitted on it cannot be judged on it")
-        split = any(info.split == "train" for info in fit_on.info)
-        return lambda: fit_on.split("train") if split else fit_on
-    if examined is not None and any(info.split == "train" for info in examined.info):
-        return lambda: examined.split("train")
-    return None
+        return training_split(fit_on) or (lambda: fit_on)
+    return None if examined is None else training_split(examined)
 
 
 def add_to(app: typer.Typer) -> None:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable
 from pathlib import Path
 
+from stylesim.corpus import Corpus
 from stylesim.errors import InputError, unknown
 from stylesim.forecast import Forecaster
 from stylesim.forecasting.baselines import ConstantTurnRate, ConstantVelocity
@@ -55,6 +56,13 @@ def open_forecaster(
     if is_entry_point(name):
         return from_entry_point(name)
     raise unknown("forecaster", name, [*BASELINES, KinematicFan.name], where="baselines, files, folders, entry points")
+
+
+def training_split(corpus: Corpus) -> Callable[[], Iterable[Scene]] | None:
+    """What gives the scenes of a corpus' training split; None where it has none."""
+    if any(info.split == "train" for info in corpus.info):
+        return lambda: corpus.split("train")
+    return None
 
 
 def _as_style(name: str) -> Forecaster:

@@ -32,9 +32,8 @@ SUDDEN = 2.0  # times the jerk of a calm foot; chosen, between it and the 2.5 wi
 FREE_M = 1.5  # deviation that the calm correction is left with; chosen, three sds of 0.8 m/s2 of noise
 CALM_MPS = 6.0  # below this speed the restlessness fades: who stands does not press; chosen, walking out of a queue
 STRAINED_MPS2 = 3.0  # of braking, from which on restlessness fades, gone at 4.5; chosen: a usual hard stop at a light
-ALMOST_HARD_MPS2 = (
-    4.0  # of braking, whose deviations may need more than 4.5; chosen: else 1 % of stops ended over the line
-)
+# Of braking, whose deviations may need more than 4.5; chosen: else 1 % of stops ended over the line.
+ALMOST_HARD_MPS2 = 4.0
 LAST_MPS2 = 0.3  # of braking, in the last moment before standing; chosen, because it is not felt
 JUMP_MPS2 = 20.0  # no vehicle does that: it was put elsewhere, and the foot begins anew
 SETTLED_STEPS = 400  # after which an answer to one draw has died away

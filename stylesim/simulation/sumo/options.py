@@ -84,10 +84,8 @@ class SignalPlan(Spec):
     groups: tuple[tuple[str, ...], ...] = Field(min_length=2, max_length=8)
     weights: tuple[float, ...] = ()
     left_turns: Literal["permissive", "protected"] = "permissive"  # of movements without letters
-    wave_cycles: float = Field(
-        default=0.0, ge=0
-    )  # or by so many cycles: 0.5 is a wave both ways over half a cycle's way
-    wave_m: float = 0.0  # the cycle begins later than the episode's by this way at the speed limit (green wave)
+    wave_m: float = 0.0  # the cycle begins later than the episode's by this way at the speed limit (green wave),
+    wave_cycles: float = Field(default=0.0, ge=0)  # and by so many cycles: 0.5 is a wave both ways
 
     @model_validator(mode="after")
     def _weights(self) -> SignalPlan:
