@@ -30,23 +30,22 @@ class JunctionClearing:
         for link in files.network.links:
             if link.edge in files.network.ends:
                 self._junctions.setdefault(link.signal, set()).add(f":{files.network.ends[link.edge][1]}")
-        self._modes: dict[str, int] = {}
-        self._signal: dict[str, str] = {}  # through whose junction each of them goes
+        self._clearing: dict[str, tuple[str, int]] = {}  # who clears which signal's junction; its own speed mode
         self._held: dict[str, tuple[str, int]] = {}  # who waits at which signal's line; steps left
 
     def before_step(self) -> None:
         """Who is out of the junction minds the right of way again, and nobody waits for it any more."""
-        if not self._modes and not self._held:
+        if not self._clearing and not self._held:
             return
         vehicle = self._sumo.vehicle
         present = set(vehicle.getIDList())
-        for name, mode in list(self._modes.items()):
+        for name, (_, mode) in list(self._clearing.items()):
             if name in present and vehicle.getRoadID(name).startswith(":"):
                 continue
-            del self._modes[name], self._signal[name]
+            del self._clearing[name]
             if name in present:
                 vehicle.setSpeedMode(name, mode)
-        clearing = set(self._signal.values())
+        clearing = {signal for signal, _ in self._clearing.values()}
         for name, (signal, steps) in list(self._held.items()):
             if name in present and steps > 0 and signal in clearing:
                 self._held[name] = (signal, steps - 1)
@@ -59,16 +58,17 @@ class JunctionClearing:
         """Who waits in the signal's junction goes."""
         vehicle, junctions = self._sumo.vehicle, self._junctions.get(signal, set())
         for name in vehicle.getIDList():
-            if name not in self._drivers or name in self._modes:
+            if name not in self._drivers or name in self._clearing:
                 continue
             road = vehicle.getRoadID(name)
             if road.rpartition("_")[0] in junctions and vehicle.getSpeed(name) < WAITING_MPS:
-                self._modes[name], self._signal[name] = vehicle.getSpeedMode(name), signal
-                vehicle.setSpeedMode(name, self._modes[name] & ~RIGHT_OF_WAY)
+                mode = vehicle.getSpeedMode(name)
+                self._clearing[name] = signal, mode
+                vehicle.setSpeedMode(name, mode & ~RIGHT_OF_WAY)
 
     def turned_green(self, signal: str, indices: Collection[int]) -> None:
         """Who stands at the line of one of these links waits for who still clears the signal's junction."""
-        if signal not in self._signal.values():
+        if all(signal != other for other, _ in self._clearing.values()):
             return
         vehicle = self._sumo.vehicle
         for lane in sorted({link.lane for link in self._links if link.signal == signal and link.index in indices}):
