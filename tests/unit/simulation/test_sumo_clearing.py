@@ -19,7 +19,7 @@ from stylesim.simulation.sumo import SumoBackend
 
 def stranded(scenario: Scenario, folder: Path) -> int:
     """Collisions of an episode in which a third of the drivers turns left against traffic."""
-    files = prepare_episode(scenario, Population.load("tdbm_spectrum"), seed=1, episode=0, folder=folder)
+    files = prepare_episode(scenario, Population.load("rare_heavy"), seed=2, episode=2, folder=folder)
     backend = SumoBackend()
     log, _ = backend.simulate(files)
     backend.close()
